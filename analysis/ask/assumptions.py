@@ -9,7 +9,7 @@ from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import battery_sentence, type_sentences, unreachable_sentences
 from dess.physics.fleet import IN_UNITS
-from dess.scenario.data_sheet import LORA
+from dess.scenario.data_sheet import LORA, DataSheet
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 
@@ -109,9 +109,23 @@ def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:
         if slowest == fastest:
             return f"{slowest[1]} from {slowest[0]} on"
         return f"{slowest[1]} from {slowest[0]} on to {fastest[1]} from {fastest[0]} on"
+    if sheet.modulation == LORA and not varied & {"bandwidth", "packet"}:
+        return _lora_rates_of(sheet)
     if sheet.modulation == LORA:
         return "the rates of LoRa"
     return f"at most {sheet.max_rate or sheet.assumed['max_rate']}"
+
+
+def _lora_rates_of(sheet: DataSheet) -> str:
+    """The rates of LoRa in words: what of its packets takes time besides the data."""
+    if sheet.packet:
+        return (
+            f"the rates of LoRa in packets of {sheet.packet}, their preambles and headers counted"
+        )
+    fast = f"{sheet.lorawan_overhead(7):.2f} times as long with spreading factor 7"
+    slow = f"{sheet.lorawan_overhead(12):.2f} times with 12"
+    overhead = f"with which a full LoRaWAN packet takes {fast} and {slow}"
+    return f"the rates of LoRa without preambles and headers, {overhead}"
 
 
 def _policy_of(results: Results, metric: str) -> str:

@@ -155,11 +155,8 @@ def make_world(scenario: ScenarioSpace) -> World:
 
 def mean_snr_at(scenario: Fields, horizontal: np.ndarray) -> np.ndarray:
     """The mean SNR [dB] at horizontal distances [m], minus infinity out of range (eq. 10)."""
-    columns, rows = scenario.size
-    diagonal = np.sqrt(2) * np.sqrt((columns * columns + rows * rows) / 2) * scenario.cell_size
-    edge = scenario.radio.anchor or diagonal / 2
     distance = hypot(horizontal, scenario.altitude)
-    loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
+    loss = 10 * scenario.path_loss_exponent * log10(distance / scenario.snr_distance)
     reach = scenario.radio.range or math.inf
     return np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
 

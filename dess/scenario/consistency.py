@@ -16,6 +16,7 @@ from dess.physics.failures import MOST_PADS
 from dess.physics.fleet import IN_UNITS, legs, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
+from dess.scenario.places import Projection
 
 # Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70
 # bytes each, and less than a second of compiled code to draw them all.
@@ -24,14 +25,41 @@ MOST_PACKETS = 2_000_000
 # Shortest distance at which the SNR is known [m]; ratios of distances to it are finite.
 NEAREST = 0.001
 
+# The error of distances from which on a sea is told, and refused.
+TOLD_ERROR, MOST_ERROR = 0.01, 0.05
+
 # Largest number of entries in the table of dess.model.channel: 8 GiB if all of it were filled.
 MOST_ENTRIES = 2**30
 
 
 def problems(c: Fields) -> Iterator[InputError]:
     """What is wrong with a scenario, each with what is allowed."""
-    for check in (_off_the_grid, _too_large, _unreachable, _unfit):
+    for check in (_off_the_grid, _distorted, _too_large, _unreachable, _unfit):
         yield from check(c)
+
+
+def distance_error(c: Fields) -> float:
+    """The largest error of distances between nodes and zones, as a share; 0 without degrees."""
+    if not c.centre:
+        return 0.0
+    corners = [(x + i * w, y + i * h) for x, y, w, h in c.rectangles for i in (0, 1)]
+    places = np.concatenate([np.array(c.nodes) + 0.5, corners])
+    return Projection(c.centre, c.size, c.cell_size).distance_error(places)
+
+
+def distance_sentence(c: Fields) -> str:
+    """How wrong distances are by the projection."""
+    error = f"{100 * distance_error(c):.2g} %"
+    return f"distances between nodes and zones are up to {error} wrong, by the projection"
+
+
+def _distorted(c: Fields) -> Iterator[InputError]:
+    """The sea is so small that one projection does for all of it."""
+    if distance_error(c) >= MOST_ERROR:
+        allowed = f"less than {100 * MOST_ERROR:g} %: a sea of fewer degrees of latitude"
+        yield InputError(
+            "centre", distance_sentence(c), f"{allowed}, or cells of another projection"
+        )
 
 
 def _off_the_grid(c: Fields) -> Iterator[InputError]:

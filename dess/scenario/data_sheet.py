@@ -45,7 +45,7 @@ _ORIGINS = {
     "arrival_rate": ("data_rate", "bandwidth"),
     "arrivals.rates": ("data_rate", "bandwidth"),
     "arrivals.message": ("message", "endurance", "bandwidth"),
-    "radio.steps": ("modulation", "rates", "bandwidth"),
+    "radio.steps": ("modulation", "rates", "bandwidth", "packet"),
     "initial_data": ("backlog", "endurance", "bandwidth"),
     "arrivals.initial": ("backlog", "endurance", "bandwidth"),
     "edge_snr": ("snr", *LINK_BUDGET, "free_space", "bandwidth"),
@@ -63,11 +63,18 @@ _ASSUMED = {
 }
 
 LORA = "lora"
-# The least SNR [dB] at which LoRa receives a spreading factor, the slowest first (SX1276 data
-# sheet); the bandwidths [Hz] that it has, and its usual coding rate.
+# The least SNR [dB] at which LoRa receives a spreading factor, the slowest first (Semtech, data
+# sheet of SX1276/77/78/79); the bandwidths [Hz] that it has, and its usual coding rate; the symbols
+# [s] from which on its low data rate optimisation leaves out two bits of each.
 _LORA_SNR = {12: -20.0, 11: -17.5, 10: -15.0, 9: -12.5, 8: -10.0, 7: -7.5}
 _LORA_BANDWIDTHS = (7.8e3, 1.625e6)
-_LORA_CODING = 4 / 5
+_LORA_CODING = Fraction(4, 5)
+_LONG_SYMBOL = 0.016
+_PREAMBLE = 8 + 4.25  # symbols
+# The header that LoRaWAN adds to a packet, and the most that a packet of its European band has
+# beside it, by spreading factor [bytes] (LoRaWAN 1.0.4; RP002, EU863-870).
+_LORAWAN_HEADER = 13
+_LORAWAN_MOST = {12: 51, 11: 51, 10: 51, 9: 115, 8: 222, 7: 222}
 
 # A step of a rate: from which SNR on it is which, and the limits of both.
 _STEP = (("dB", (-200, 200)), ("bit/s", (1e-6, 1e15)))
@@ -202,6 +209,9 @@ class DataSheet(Section):
         None,
         description=Description("from which SNR on the rate is which", form="a list, both rising"),
         examples=['[["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]'],
+    )
+    packet: str | None = _quantity(
+        "bit", "size of a lora packet, whose preamble and header then take time", 8, 2040, "51 B"
     )
     duty_cycle: str | None = _quantity(
         "percent", "share of the time in which a node may send", 0.01, 100, "1 %"
@@ -658,6 +668,8 @@ class DataSheet(Section):
                 raise InputError(name, f"is given beside {other}", "one of both")
         if self.modulation == LORA:
             return self._lora_steps()
+        if self.packet:
+            self._refuse("packet", "is of lora", 'modulation = "lora", or no packet')
         bandwidth = self.number("bandwidth")
         steps: list[tuple[float, float]] = []
         for pair in self.rates or ():
@@ -679,9 +691,36 @@ class DataSheet(Section):
         least, most = _LORA_BANDWIDTHS
         if not least <= self.number("bandwidth") <= most:
             self._refuse("bandwidth", "is none of lora", "7.8 kHz..1.625 MHz")
+        size = self.number("packet") / 8
+        if not size.is_integer():
+            self._refuse("packet", "is no whole number of bytes", "1 B to 255 B")
         return tuple(
-            (snr, factor * _LORA_CODING / (1 << factor)) for factor, snr in _LORA_SNR.items()
+            (snr, self._lora_rate(factor, int(size)) / self.number("bandwidth"))
+            for factor, snr in _LORA_SNR.items()
         )
+
+    def _lora_rate(self, factor: int, size: int = 0) -> float:
+        """The rate of a spreading factor in packets of a size [bytes], or of its symbols alone.
+
+        Returns:
+            The rate [bit/s].
+        """
+        symbol = (1 << factor) / self.number("bandwidth")
+        bits = factor
+        if symbol >= _LONG_SYMBOL:
+            bits -= 2
+        if not size:
+            return float(bits * _LORA_CODING) / symbol
+        # Semtech, data sheet of SX1276/77/78/79, 4.1.1.7: with an explicit header and a checksum.
+        blocks = max(math.ceil((8 * size - 4 * factor + 28 + 16) / (4 * bits)), 0)
+        symbols = _PREAMBLE + 8 + blocks * 4 / _LORA_CODING
+        return 8 * size / (float(symbols) * symbol)
+
+    def lorawan_overhead(self, factor: int) -> float:
+        """How many times as long as its data a full LoRaWAN packet takes with all that is sent."""
+        most = _LORAWAN_MOST[factor]
+        sent = most + _LORAWAN_HEADER
+        return self._lora_rate(factor) / self._lora_rate(factor, sent) * sent / most
 
     def _check_speeds(self) -> None:
         """Refuse a largest airspeed below the cruising speed, and a wind that it cannot fly in."""

@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 from functools import cache
-from math import fsum
+from math import fsum, sqrt
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
@@ -281,6 +281,13 @@ class Fields(Strict):
         ),
     )
     data_sheet: DataSheet = DataSheet.off()
+
+    @property
+    def snr_distance(self) -> float:
+        """The distance at which the mean SNR is ``edge_snr`` [m]."""
+        columns, rows = self.size
+        half = sqrt(2) * sqrt((columns * columns + rows * rows) / 2) * self.cell_size / 2
+        return self.radio.anchor or half
 
     @property
     def size(self) -> tuple[int, int]:

@@ -7,7 +7,8 @@ text = new.text()
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ import numpy as np
 from dess.base.elementary import hypot
 from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.base.files.reading import parse_toml
-from dess.scenario.data_sheet import LINK_BUDGET, DataSheet
+from dess.scenario.data_sheet import LINK_BUDGET, LORA, DataSheet
 from dess.scenario.nodes import MAX_GRID, RATES, NodesFile, NodesFound
 from dess.scenario.places import GEOGRAPHIC, LIMITS, Projection
 from dess.scenario.quantities import printed
@@ -27,10 +28,11 @@ _BEYOND = {
     "base": ('where UAVs start and charge, in degrees, such as "8.70, 53.87", or as x, y', None),
     "uavs": ("number of UAVs", "2"),
     "pads": ("number of charging pads", "1"),
+    "zone": ('size of the charging zone in cells, such as "3 x 2"; or two cells for each UAV', ""),
     "no_fly": ("file with land and islands", ""),
 }
 _NEEDED = ("endurance", "cruise", "charging", "data_rate", "bandwidth")
-_ASKED = ("range", "horizon", "max_speed", "wind")
+_ASKED = ("range", "horizon", "reserve", "hover", "altitude", "max_speed", "wind")
 # What an answer needs beside it.
 _NEEDED_WITH = {"repair": "mtbf", "pad_repair": "pad_mtbf", "wind": "max_speed"}
 # What stands for an answer that a sheet needs and that is not given yet.
@@ -55,24 +57,26 @@ class NewScenario:
         self.nodes = NodesFound.read(nodes, NodesFile.model_validate({"file": nodes.name}))
         self.answers: dict[str, str] = {}
 
-    def questions(self, answered: Iterable[str] = ()) -> dict[str, tuple[str, str | None]]:
+    def questions(self, answered: Mapping[str, str]) -> dict[str, tuple[str, str | None]]:
         """What is asked: the meaning, and a default or None.
 
         Args:
-            given: The names of what is answered already. Who gives a part of a link budget is asked
-                for the rest of it, in place of the SNR.
+            answered: What is answered already. Who gives a part of a link budget, or LoRa without
+                an SNR, is asked for the rest of the budget in place of the SNR.
         """
-        answered = {*answered}
         link: tuple[str, ...] = ("snr",)
-        if answered & {*LINK_BUDGET, "free_space"}:
+        optional = _ASKED
+        has_budget = bool(answered.keys() & {*LINK_BUDGET, "free_space"})
+        if has_budget or (answered.get("modulation") == LORA and "snr" not in answered):
             link = LINK_BUDGET
+            optional = ("free_space", *_ASKED)
         needed = [*_NEEDED, *link]
         needed += [name for field, name in _NEEDED_WITH.items() if field in answered]
         if self.nodes.has_amounts(RATES):
             needed.remove("data_rate")
         asked: dict[str, tuple[str, str | None]]
         asked = {name: (DataSheet.form_of(name), None) for name in needed}
-        asked |= {name: (DataSheet.form_of(name), "") for name in _ASKED if name not in needed}
+        asked |= {name: (DataSheet.form_of(name), "") for name in optional if name not in needed}
         return asked | _BEYOND
 
     def check(self, name: str, answer: str) -> None:
@@ -91,6 +95,8 @@ class NewScenario:
             self._check_base(answer)
         elif name == "no_fly":
             self._check_no_fly(answer)
+        elif name == "zone":
+            _sides_of_zone(answer)
         elif not (answer.isdecimal() and 1 <= int(answer) <= 64):
             raise InputError(name, f"{shown(answer)} is out of range", "1..64")
         self._check_together(self.answers | {name: answer})
@@ -131,7 +137,16 @@ class NewScenario:
             raise InputError("no_fly", f"{shown(answer)} is no file", allowed)
 
     def _check_together(self, answers: Mapping[str, str]) -> None:
-        """Refuse answers from which no slots and cells follow, or a sea that is too large."""
+        """Refuse answers from which no slots and cells follow, or a sea that is too large.
+
+        A zone has a cell for each UAV and each pad.
+        """
+        if answers.get("zone"):
+            width, height = _sides_of_zone(answers["zone"])
+            for name in ("uavs", "pads"):
+                if int(answers.get(name) or 1) > width * height:
+                    problem = f"{shown(answers['zone'])} has {width * height} cells"
+                    raise InputError("zone", problem, f"{answers[name]} or more, as {name} says")
         if not (answers.get("endurance") and answers.get("cruise")):
             return
         sheet = _sheet_of(answers)
@@ -150,15 +165,22 @@ class NewScenario:
             self._check_size(answers, cell)
 
     def _check_size(self, answers: Mapping[str, str], cell: float) -> None:
-        columns, rows, _ = self._sides(answers, cell)
+        columns, rows = self._sides(answers, cell)
         if max(columns, rows) > MAX_GRID:
             size = f"{columns:,} x {rows:,} cells of {printed(cell, 'm')}, the way of a slot"
             allowed = f"{MAX_GRID} x {MAX_GRID}, with UAVs that fly further or a nearer base"
             raise InputError("base", f"{self.path} and the base take {size}", allowed)
 
-    def _sides(self, answers: Mapping[str, str], cell: float) -> tuple[int, int, int]:
-        """The cells of the grid from west to east and from north to south, and of a zone's side."""
+    def _zone(self, answers: Mapping[str, str]) -> tuple[int, int]:
+        """The cells of the charging zone from west to east and from north to south."""
+        if answers.get("zone"):
+            return _sides_of_zone(answers["zone"])
         side = math.ceil(math.sqrt(2 * int(answers.get("uavs") or _BEYOND["uavs"][1] or 1)))
+        return side, side
+
+    def _sides(self, answers: Mapping[str, str], cell: float) -> tuple[int, int]:
+        """The cells of the grid from west to east and from north to south."""
+        side = max(self._zone(answers))
         base = np.array([_place(answers["base"])])
         spots = np.vstack([self.nodes.spots, base])
         sides = spots.max(0) + side
@@ -166,7 +188,7 @@ class NewScenario:
             spots = Projection.about(self.nodes.spots, (0, 0), cell).cells(spots)
             sides = 2 * (np.abs(spots).max(0) + side)
         columns, rows = (max(math.ceil(length), 4) for length in sides)
-        return columns, rows, side
+        return columns, rows
 
     def text(self, place: str = "") -> str:
         """The text of the scenario, once all questions are answered.
@@ -182,13 +204,14 @@ class NewScenario:
         sheet = _sheet_of(answers)
         cell = validated(DataSheet, sheet, "data_sheet").units.cell
         self._check_size(answers, cell)
-        columns, rows, side = self._sides(answers, cell)
+        columns, rows = self._sides(answers, cell)
+        width, height = self._zone(answers)
         x, y = _place(answers["base"])
         cells = self.nodes.spots
-        zone = f"[{x:.0f}, {y:.0f}, {side}, {side}]"
+        zone = f"[{x:.0f}, {y:.0f}, {width}, {height}]"
         if self.nodes.is_geographic:
             cells = Projection.about(cells, (columns, rows), cell).cells(cells)
-            zone = f"{{lon = {x!r}, lat = {y!r}, width = {side}, height = {side}}}"
+            zone = f"{{lon = {x!r}, lat = {y!r}, width = {width}, height = {height}}}"
         if not place and len(np.unique(np.floor(cells), axis=0)) < len(cells):
             place = "merge"
         file = json.dumps(self.path.name) + (f", place = {json.dumps(place)}" if place else "")
@@ -230,6 +253,17 @@ def _told(name: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise error.within(name) from None
+
+
+def _sides_of_zone(answer: str) -> tuple[int, int]:
+    """The width and the height of a zone; without an answer none."""
+    if not answer:
+        return 0, 0
+    match = re.fullmatch(r"([1-9][0-9]?) ?[x,] ?([1-9][0-9]?)", answer.strip())
+    if not match:
+        allowed = 'its cells from west to east and from north to south, such as "3 x 2"'
+        raise InputError("zone", f"{shown(answer)} is no size", allowed)
+    return int(match[1]), int(match[2])
 
 
 def _place(answer: str) -> list[float]:

@@ -4,20 +4,21 @@
     no_fly = ["land.geojson", {file = "routes.geojson", width = 2000, touched = true}]
 
 Of polygons, a cell is a no-fly cell if its centre lies in one of them, and not in a hole; with
-``touched``, every cell of which a part does. A line with a width is a shipping lane; without one,
-it closes every cell that it touches. A point closes its cell, and one with a ``radius`` of its own
-every cell whose centre lies in the circle. A map in a text (``.txt``, ``.map``)
+``touched``, every cell of which a part does. Points and lines close every cell that they touch, on
+an edge those of both sides; a line with a width, and a point with a ``radius`` of its own, every
+cell whose centre lies in the lane or the circle as well. A map in a text (``.txt``, ``.map``)
 has a line for each row of cells, one in a picture (``.png``) a pixel for each cell.
 """
 
 import io
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -35,6 +36,22 @@ from dess.scenario.quantities import quantity_of
 CLOSED, FREE = "#@OTW", ".GS"
 _MAPF = CLOSED[1:] + FREE
 MOST_METRES = 10**6  # of a width, a buffer or a radius
+# How far beyond itself a point or a line touches a cell [cells]: it may lie on an edge, which the
+# rounding of a projection puts on either side.
+_HAIR = 1e-6
+
+_REMEDY = "touched = true closes all cells that they touch"
+
+# What a place says of its extent, by the last word of a property: its radius, perhaps with a unit
+# as in "Radius (km)"; what is not read; from and up to which altitude it reaches.
+_RADIUS = re.compile(r"radius[ _.-]*[(\[]?([a-z]*)[)\]]?", re.IGNORECASE)
+_UNREAD = re.compile(r"radius|diameter|width|buffer|wkt|polygon", re.IGNORECASE)
+_LOWER = re.compile(r"lower|floor|min_?alt", re.IGNORECASE)
+_UPPER = re.compile(r"upper|ceil|max_?alt", re.IGNORECASE)
+_OF_A_LIMIT = re.compile(r"ref|datum|unit|uom", re.IGNORECASE)
+_UNIT = re.compile(r"unit|uom", re.IGNORECASE)
+# In hundreds of feet, as FL100 or as 100 with the unit FL.
+_FLIGHT_LEVEL = re.compile(r"FL ?([0-9]{1,3})|([0-9]{1,3}) FL", re.IGNORECASE)
 
 
 class NoFlyFile(places.Source):
@@ -51,21 +68,22 @@ class NoFlyFile(places.Source):
 
 
 def no_fly_in(
-    path: Path, size: Size, projection: Projection | None, source: NoFlyFile
+    path: Path, size: Size, projection: Projection | None, source: NoFlyFile, altitude: float
 ) -> np.ndarray:
-    """(H, W) whether a cell is a no-fly cell of a file; a note tells of what closes none.
+    """(H, W) whether a cell is a no-fly cell of a file; notes tell what closes none or is not read.
 
     Args:
         path: A file ``.txt``, ``.map``, ``.png``, ``.csv``, ``.tsv``, ``.geojson`` or ``.json``.
         size: Cells of the grid from west to east and from north to south.
         projection: That of the sea, none if the nodes are cells.
         source: What is taken of the file.
+        altitude: That of the UAVs [m]; a note tells of zones that begin above it.
 
     Raises:
-        InputError: If the file cannot be read, a map has another size, a cell is off the grid, or
-            the file has degrees and the nodes are cells.
+        InputError: If the file cannot be read, a map has another size, ``where`` takes no place, a
+            cell is off the grid, or the file has degrees and the nodes are cells.
     """
-    return places.reader(path, _READERS)(path, size, projection, source)
+    return places.reader(path, _READERS)(path, size, projection, source, altitude)
 
 
 def zones_in(path: Path, size: Size) -> list[Rectangle]:
@@ -76,15 +94,23 @@ def zones_in(path: Path, size: Size) -> list[Rectangle]:
     """
     from scipy import ndimage
 
-    red, _, blue = np.moveaxis(places.reader(path, {".png": _pixels})(path, size), 2, 0)
-    is_blue = (blue > 127) & (red < 128)
+    pixels = places.reader(path, {".png": _pixels})(path, size)
+    is_blue = _is_blue(pixels)
     rectangles = ndimage.find_objects(ndimage.label(is_blue)[0])
-    if not rectangles or not all(is_blue[part].all() for part in rectangles):
-        raise InputError(path, "has no zones", "one blue rectangle or more")
+    if not rectangles:
+        raise InputError(path, "has no blue pixels, of which zones are", "one rectangle or more")
+    for y, x in rectangles:
+        if not is_blue[y, x].all():
+            where = f"x {x.start}..{x.stop - 1}, y {y.start}..{y.stop - 1}"
+            problem = f"the blue pixels at {where} do not fill their rectangle"
+            raise InputError(path, problem, "filled rectangles that do not touch each other")
     return [(x.start, y.start, x.stop - x.start, y.stop - y.start) for y, x in rectangles]
 
 
-def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) -> np.ndarray:
+def _of_text(
+    path: Path, size: Size, _: Projection | None, source: NoFlyFile, altitude: float
+) -> np.ndarray:
+    _tell_unused(path, source, "a map", "file")
     text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a map")
     rows = [(number, line.rstrip()) for number, line in enumerate(text.splitlines(), 1)]
     if text.startswith("type"):  # the header of a map of the MAPF benchmark
@@ -106,17 +132,36 @@ def _of_text(path: Path, size: Size, _: Projection | None, source: NoFlyFile) ->
     return np.array([[cell in CLOSED for cell in line] for _, line in rows])
 
 
-def _of_picture(path: Path, size: Size, _: Projection | None, source: NoFlyFile) -> np.ndarray:
+def _of_picture(
+    path: Path, size: Size, _: Projection | None, source: NoFlyFile, altitude: float
+) -> np.ndarray:
+    _tell_unused(path, source, "a picture", "file", "colours")
     pixels = _pixels(path, size)
     closed = (pixels[..., 0] > 127) & (pixels[..., 2] < 128)
     if source.colours:
         colours = [[int(colour[n : n + 2], 16) for n in (1, 3, 5)] for colour in source.colours]
         closed = (pixels[:, :, None] == np.array(colours)).all(3).any(2)
     if not closed.any():
-        present = np.unique(pixels.reshape(-1, 3), axis=0).tolist()
-        names = listed(f"#{bytes(colour).hex()}" for colour in present)
+        names = _colours_of(pixels.reshape(-1, 3))
         _note(f"{path} closes no cell; its colours are {names}: colours says which do")
+        return closed
+    is_open_or_zone = (pixels == 0).all(2) | (pixels == 255).all(2) | _is_blue(pixels)
+    unread = pixels[~closed & ~is_open_or_zone]
+    if len(unread) and not source.colours:
+        count = f"{len(unread):,} pixels of {_colours_of(unread)}"
+        _note(f"{path}: {count} close no cell; colours says which do")
     return closed
+
+
+def _is_blue(pixels: np.ndarray) -> np.ndarray:
+    """(H, W) whether pixels are those of zones."""
+    return (pixels[..., 2] > 127) & (pixels[..., 0] < 128)
+
+
+def _colours_of(pixels: np.ndarray) -> str:
+    """The colours of (K, 3) pixels, as a message lists them."""
+    present = np.unique(pixels, axis=0).tolist()
+    return listed(f"#{bytes(colour).hex()}" for colour in present)
 
 
 def _pixels(path: Path, size: Size) -> np.ndarray:
@@ -138,8 +183,15 @@ def _pixels(path: Path, size: Size) -> np.ndarray:
     return pixels
 
 
+def _tell_unused(path: Path, source: NoFlyFile, kind: str, *used: str) -> None:
+    """Tell in a note which keys say nothing about a file of this kind."""
+    unused = [name for name in source.model_fields_set if name not in used]
+    if unused:
+        _note(f"{path} is {kind}, for which {listed(sorted(unused))} has no effect")
+
+
 def _of_places(
-    path: Path, size: Size, projection: Projection | None, source: NoFlyFile
+    path: Path, size: Size, projection: Projection | None, source: NoFlyFile, altitude: float
 ) -> np.ndarray:
     is_geographic, features = places.reader(path, places.READERS)(path)
     if not features:
@@ -150,30 +202,56 @@ def _of_places(
             "has degrees, and the nodes are cells",
             "cells, nodes from a file with degrees, or centre",
         )
-    closed = np.zeros(size[::-1], np.bool_)
-    unseen = []
-    chosen = source.chosen(features)
-    if not is_geographic and any(_has_radius(place) for place in chosen):
+    chosen = source.chosen(features, path)
+    if is_geographic and projection:
+        return _of_degrees(path, chosen, projection, source, altitude)
+    _tell_unused(path, source, "a table of cells", "file", "where")
+    if any(_radii(place) for place in chosen):
         _note(f"{path}: the column radius is not used, since its places are cells and no degrees")
+    closed = np.zeros(size[::-1], np.bool_)
     for place in chosen:
-        if is_geographic and projection:
-            cells, is_near = _cells_of(place, projection, source, _radius(place, path))
-            if is_near and not cells.any():
-                unseen.append(place.where)
-        else:
-            cells = np.zeros_like(closed)
-            cell = place.shapes[0][1][0][0].astype(int)
-            if not places.is_on_grid(cell, size):
-                what = f"off the grid of {size[0]} x {size[1]} cells, at {cell.tolist()}"
-                allowed = f"0 <= x < {size[0]}, 0 <= y < {size[1]}"
-                raise InputError(path, f"{place.where} is {what}", allowed)
-            cells[cell[1], cell[0]] = True
+        x, y = place.shapes[0][1][0][0].astype(int)
+        if not places.is_on_grid((x, y), size):
+            what = f"off the grid of {size[0]} x {size[1]} cells, at {[int(x), int(y)]}"
+            allowed = f"0 <= x < {size[0]}, 0 <= y < {size[1]}"
+            raise InputError(path, f"{place.where} is {what}", allowed)
+        closed[y, x] = True
+    return closed
+
+
+def _of_degrees(
+    path: Path, chosen: list[Place], projection: Projection, source: NoFlyFile, altitude: float
+) -> np.ndarray:
+    from scipy import ndimage
+
+    _tell_unused(path, source, "a file of places", *(NoFlyFile.model_fields.keys() - {"colours"}))
+    closed = np.zeros(projection.size[::-1], np.bool_)
+    unseen = []
+    elsewhere = []
+    for place in chosen:
+        cells, is_near = _cells_of(place, projection, source, _radius(place, path))
+        if is_near and not cells.any():
+            unseen.append(place.where)
+        if cells.any() and _lies_elsewhere(place, altitude):
+            elsewhere.append(place.where)
         closed |= cells
     if unseen:
         names = listed(unseen)
-        _note(f"{path}: {names} close no cell; touched = true closes all cells that they touch")
+        _note(f"{path}: {names} close no cell; {_REMEDY}")
     elif not closed.any():
         _note(f"{path} closes no cell: it is not on the grid")
+    beside = ndimage.binary_dilation(closed, np.ones((5, 5)))
+    narrow = [p.where for p in chosen if p.where not in unseen and _has_gaps(p, projection, beside)]
+    if narrow and not source.touched:
+        names = listed(narrow)
+        _note(f"{path}: {names} are narrower than a cell at places that stay open; {_REMEDY}")
+    if elsewhere:
+        names = listed(elsewhere)
+        problem = f"lie above or below the UAVs, {altitude:g} m high, and close their cells"
+        _note(f"{path}: by their limits of altitude {names} {problem}; where leaves them out")
+    unread = {name for place in chosen for name in _unread_names(place)}
+    if unread:
+        _note(f"{path}: {listed(sorted(unread))} of its places is not read; width and buffer are")
     return closed
 
 
@@ -191,48 +269,113 @@ def notes_after() -> Iterator[None]:
     finally:
         _held.reset(token)
     for line in notes:
-        _note(line)
+        tell(line)
 
 
 def _note(line: str) -> None:
+    tell(f"no_fly: {line}")
+
+
+def tell(line: str) -> None:
     """Tell once what a user should know, or keep it for the end of ``notes_after``."""
     notes = _held.get()
     if notes is None:
-        _tell(line)
+        _tell_once(line)
     else:
         notes.append(line)
 
 
 @cache
-def _tell(line: str) -> None:
-    logging.getLogger(__name__).warning("note: no_fly: %s", line)
+def _tell_once(line: str) -> None:
+    logging.getLogger(__name__).warning("note: %s", line)
 
 
-_RADIUS = ("radius",)  # what the property or the column of a circle is called
+def _statements(values: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, Any]]:
+    """The properties of a place that are not empty, those of tables in them dotted."""
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _statements(value, f"{within}{name}.")
+        elif value not in (None, ""):
+            yield f"{within}{name}", value
 
 
-def _has_radius(place: Place) -> bool:
-    return place.property("", _RADIUS) is not None
+def _radii(place: Place) -> dict[str, str]:
+    """The radii of a circle, with their units, by the names of the properties that say them."""
+    radii = {}
+    for name, value in _statements(place.properties):
+        match = _RADIUS.fullmatch(name.rpartition(".")[2])
+        if match:
+            text = str(value).strip()
+            if not text[-1:].isalpha():
+                unit = match[1].lower() or "m"
+                text = f"{text} {'NM' if unit == 'nm' else unit}"
+            radii[name] = text
+    return radii
 
 
 def _radius(place: Place, path: Path) -> float:
-    """The radius of a circle [m]: a number in metres, or a distance with its unit; or else 0.
+    """The radius of a circle [m], the largest that it has; 0 without one.
 
     Raises:
         InputError: If it is none.
     """
-    value = place.property("", _RADIUS)
-    if value is None or all(kind != places.POINT for kind, _ in place.shapes):
-        return 0.0
-    where = f"{path}: {place.where}: radius"
-    try:
-        radius = float(str(value))
-    except ValueError:
-        radius = quantity_of(str(value), where, "m")
-    if not 0 <= radius <= MOST_METRES:
-        allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
-        raise InputError(where, f"{shown(value)} is out of range", allowed)
-    return radius
+    largest = 0.0
+    for name, text in _radii(place).items():
+        if _has_points(place):
+            where = f"{path}: {place.where}: {name}"
+            radius = quantity_of(text, where, "m")
+            if not 0 <= radius <= MOST_METRES:
+                allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
+                raise InputError(where, f"{shown(text)} is out of range", allowed)
+            largest = max(largest, radius)
+    return largest
+
+
+def _has_points(place: Place) -> bool:
+    return any(kind == places.POINT for kind, _ in place.shapes)
+
+
+def _unread_names(place: Place) -> list[str]:
+    """The properties of a place that seem to say how far it reaches, and are not read."""
+    radii = _radii(place)
+    if not _has_points(place):
+        radii = {}
+    return [
+        name
+        for name, _ in _statements(place.properties)
+        if _UNREAD.search(name.rpartition(".")[2]) and name not in radii
+    ]
+
+
+def _lies_elsewhere(place: Place, altitude: float) -> bool:
+    """Whether a place begins above an altitude [m], or ends below it."""
+    lower = _limits(place, _LOWER)
+    upper = [limit for limit in _limits(place, _UPPER) if limit > 0]  # 0 is often for none
+    return max(lower, default=0.0) > altitude or min(upper, default=altitude) < altitude
+
+
+def _limits(place: Place, kind: re.Pattern[str]) -> list[float]:
+    """The limits of altitude of a kind that a place has [m]; without a unit they are metres."""
+    limits = []
+    statements = dict(_statements(place.properties))
+    for name, value in statements.items():
+        table, _, word = name.rpartition(".")
+        if not kind.search(name) or _OF_A_LIMIT.search(word):
+            continue
+        text = str(value).strip()
+        if not text[-1:].isalpha() and not _FLIGHT_LEVEL.fullmatch(text):
+            units = [
+                str(unit).lower()
+                for other, unit in statements.items()
+                if other.rpartition(".")[0] == table and _UNIT.search(other)
+            ]
+            text = f"{text} {next(filter(str.isalpha, units), 'm')}"
+        level = _FLIGHT_LEVEL.fullmatch(text)
+        if level:
+            text = f"{level[1] or level[2]}00 ft"
+        with suppress(InputError):  # a word, such as that for the surface of the sea
+            limits.append(quantity_of(text, name, "m"))
+    return limits
 
 
 def _cells_of(
@@ -259,14 +402,14 @@ def _cells_of(
             low = turned[0].min(0)
             high = turned[0].max(0)
             margin = reach / projection.cell_size
-            if (high + margin < 0).any() or (low - margin >= size).any():
+            beyond = margin + _HAIR
+            if (high + beyond < 0).any() or (low - beyond >= size).any():
                 continue
             is_near = True
-            x, y = np.floor(turned[0][0]).astype(int)
-            if kind == places.POINT and source.buffer == 0 and places.is_on_grid((x, y), size):
-                closed[y, x] = True
-            if kind == places.POINT and not reach:
-                continue
+            if kind == places.POINT:
+                closed |= _cells_at(turned[0][0], size)
+                if not reach:
+                    continue
             if kind == places.POLYGON and not reach and not source.touched:
                 closed |= centres_in(turned, size)
             else:
@@ -274,10 +417,54 @@ def _cells_of(
     return closed, is_near
 
 
+def _has_gaps(place: Place, projection: Projection, beside: np.ndarray) -> bool:
+    """Whether a border of a polygon has a part on the grid without closed cells beside it.
+
+    Args:
+        place: The feature.
+        projection: That of the sea.
+        beside: (H, W) whether a cell is closed, or one of those around it.
+    """
+    size = np.array(projection.size)
+    for kind, rings in place.shapes:
+        for turned in projection.shapes(rings) if kind == places.POLYGON else ():
+            cells = np.concatenate([_border_of(ring, projection.size) for ring in turned])
+            x, y = cells[((cells > 0) & (cells < size - 1)).all(1)].T  # beyond the rim is land
+            if not beside[y, x].all():
+                return True
+    return False
+
+
+def _border_of(ring: np.ndarray, size: Size) -> np.ndarray:
+    """(K, 2) the cells along a ring, of its edges that may be on the grid."""
+    low = np.minimum(ring[:-1], ring[1:])
+    high = np.maximum(ring[:-1], ring[1:])
+    is_near = ((low < size) & (high > 0)).all(1)
+    starts = ring[:-1][is_near]
+    steps = np.diff(ring, axis=0)[is_near]
+    counts = np.ceil(2 * np.abs(steps)).astype(int).max(1, initial=1)  # at every half of a cell
+    edges = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    shares = (np.arange(len(edges)) - first[edges]) / counts[edges]
+    return np.floor(starts[edges] + shares[:, None] * steps[edges]).astype(int)
+
+
+def _cells_at(spot: np.ndarray, size: Size) -> np.ndarray:
+    """(H, W) whether a place [cells] lies in a cell or on its edge."""
+    cells = np.zeros(size[::-1], np.bool_)
+    first = np.floor(spot - _HAIR).astype(int).clip(0)
+    last = np.floor(spot + _HAIR).astype(int).clip(-1)
+    cells[first[1] : last[1] + 1, first[0] : last[0] + 1] = True
+    return cells
+
+
 def _covered(
     kind: str, rings: list[np.ndarray], reach: float, size: Size, touched: bool
 ) -> np.ndarray:
-    """(H, W) whether a cell is in reach [cells] of a shape, with a part or with its centre."""
+    """(H, W) whether a cell is in reach [cells] of a shape, with a part or with its centre.
+
+    A line closes the cells that it touches as well.
+    """
     needs("geo", "no_fly with lines, circles, touched or buffer")
     import shapely
 
@@ -286,13 +473,20 @@ def _covered(
     shape = shapely.make_valid(shapely.geometry.shape({"type": kind, "coordinates": coordinates}))
     edge = reach + 1  # what is further away has no effect
     shape = shapely.clip_by_rect(shape, -edge, -edge, size[0] + edge, size[1] + edge)
+    thin = shape
+    if not shape.area:  # a point, a line, or a polygon that has collapsed to one
+        thin = shape.buffer(_HAIR)
+    wide = thin
     if reach:
-        shape = shape.buffer(reach)
-    shapely.prepare(shape)
-    if touched or (kind == places.LINE and not reach):
-        cells = shapely.box(x, y, x + 1, y + 1)
-        return shapely.intersects(shape, cells) & ~shapely.touches(shape, cells)
-    return shapely.contains_xy(shape, x + 0.5, y + 0.5)
+        wide = shape.buffer(reach)
+    shapely.prepare([thin, wide])
+    cells = shapely.box(x, y, x + 1, y + 1)
+    if touched:
+        return shapely.intersects(wide, cells) & ~shapely.touches(wide, cells)
+    covered = shapely.contains_xy(wide, x + 0.5, y + 0.5)
+    if kind == places.LINE:
+        covered |= shapely.intersects(thin, cells)
+    return covered
 
 
 def centres_in(rings: list[np.ndarray], size: Size) -> np.ndarray:
@@ -334,7 +528,7 @@ def polygons_hold(
     is_held = np.zeros(len(spots), np.bool_)
     if path.suffix.lower() not in places.READERS:
         return is_held
-    for place in source.chosen(places.reader(path, places.READERS)(path).places):
+    for place in source.chosen(places.reader(path, places.READERS)(path).places, path):
         for kind, rings in place.shapes:
             for turned in projection.shapes(rings) if kind == places.POLYGON else ():
                 is_held |= _lie_in(turned, spots)

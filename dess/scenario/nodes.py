@@ -96,7 +96,7 @@ class NodesFound(NamedTuple):
         is_geographic, features = places.reader(path, places.READERS)(path)
         points = [
             (place, ring[0])
-            for place in source.chosen(features)
+            for place in source.chosen(features, path)
             for kind, (ring, *_) in place.shapes
             if kind == places.POINT
         ]

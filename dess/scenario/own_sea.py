@@ -203,7 +203,7 @@ class OwnSea(NamedTuple):
         closed = np.zeros(self.grid.size[::-1], np.bool_)
         for source in sources:
             path = self.beside("no_fly", source.file)
-            closed |= no_fly_in(path, self.grid.size, projection, source)
+            closed |= no_fly_in(path, self.grid.size, projection, source, self.grid.altitude)
         return {"no_fly": [(x, y) for y, x in np.argwhere(closed).tolist()]}
 
     def _no_fly_files(self, values: Mapping[str, Any]) -> list[NoFlyFile]:

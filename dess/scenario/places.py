@@ -87,6 +87,26 @@ class Projection(NamedTuple):
         """
         return (places - np.array(self.size) / 2) / self._degree + self.centre
 
+    def distance_error(self, places: np.ndarray) -> float:
+        """The largest error of distances in the rectangle around (K, 2) places [cells], as a share.
+
+        Distances between its corners, and from them a hundredth of a cell to the east, are compared
+        with those on the Earth (great circles).
+        """
+        low, high = places.min(0), places.max(0)
+        corners = np.array([low, high, [low[0], high[1]], [high[0], low[1]]])
+        spots = np.concatenate([corners, corners + [0.01, 0]])
+        first, second = np.triu_indices(len(spots), 1)
+        across = spots[first] - spots[second]
+        on_grid = np.sqrt((across**2).sum(1)) * self.cell_size
+        degrees = np.radians(self.degrees(spots))
+        half = np.sin((degrees[first] - degrees[second]) / 2) ** 2
+        lats = np.cos(degrees[:, 1])
+        on_earth = np.arcsin(np.sqrt(half[:, 1] + lats[first] * lats[second] * half[:, 0]))
+        is_known = on_grid > 0
+        errors = on_grid[is_known] / (2 * EARTH_RADIUS * on_earth[is_known]) - 1
+        return float(np.abs(errors).max())
+
     def shapes(self, rings: list[np.ndarray]) -> Iterator[list[np.ndarray]]:
         """The rings of a shape on the grid [cells]; once more for each turn around the Earth.
 
@@ -159,13 +179,24 @@ class Source(Strict):
         default={}, description="the properties of what is taken, e.g. {Country = 'DK*'}"
     )
 
-    def chosen(self, places: list[Place]) -> list[Place]:
-        """The places that have the wanted properties; ``*`` and ``?`` stand for other letters."""
-        return [
-            place
-            for place in places
-            if all(fnmatchcase(str(place.properties.get(k)), v) for k, v in self.where.items())
-        ]
+    def chosen(self, places: list[Place], path: Path) -> list[Place]:
+        """The places that have the wanted properties; ``*`` and ``?`` stand for other letters.
+
+        Raises:
+            InputError: If the file, whose path is for the message, has places and none is chosen.
+        """
+        chosen = places
+        for name, pattern in self.where.items():
+            present = chosen
+            chosen = [p for p in present if fnmatchcase(str(p.properties.get(name)), pattern)]
+            if present and not chosen:
+                values = [str(p.properties[name]) for p in present if name in p.properties]
+                if not values:
+                    names = [other for place in present for other in place.properties]
+                    raise unknown_name(path, f"has no {name}", name, names)
+                problem = f"where: no place has {name} = {shown(pattern)}"
+                raise unknown_name(path, problem, pattern, values)
+        return chosen
 
 
 def reader(path: Path, readers: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
@@ -253,7 +284,7 @@ def _number(text: str, place: str, most: int, is_geographic: bool) -> float:
     return min(max(number, -most), most)
 
 
-class _Geometry(Document, extra="ignore"):
+class _Geometry(Document, extra="allow"):
     type: Literal[
         "Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon",
         "GeometryCollection",
@@ -262,7 +293,7 @@ class _Geometry(Document, extra="ignore"):
     geometries: list[dict[str, Any]] = Field([], description="geometries")
 
 
-class _Feature(Document, extra="ignore"):
+class _Feature(Document, extra="allow"):
     id: str | int | float | None = None
     geometry: _Geometry | None = Field(None, description="a geometry")
     properties: dict[str, Any] | None = None
@@ -277,6 +308,9 @@ class Features(Document, extra="ignore"):
 def read_geojson(path: Path) -> Places:
     """The features of a GeoJSON file; those without a geometry have no shapes.
 
+    Members that GeoJSON does not know are properties as well. A geometry within another one that
+    has such members, as zones of ED-318 have them, is a place of its own.
+
     Raises:
         InputError: If it cannot be read, or is no GeoJSON.
     """
@@ -284,18 +318,36 @@ def read_geojson(path: Path) -> Places:
     features = Features.load(path, absent=_GEOJSON, limit=TEXT_LIMIT).features
     for number, feature in enumerate(features):
         where = f"features.{number}"
-        shapes = []
+        properties = {"id": feature.id} | _foreign(feature) | (feature.properties or {})
+        place = Place(where, properties, [])
         if feature.geometry:
-            shapes = [*_shapes(feature.geometry, f"{path}: {where}.geometry")]
-        places.append(Place(where, {"id": feature.id} | (feature.properties or {}), shapes))
+            place.properties.update(_foreign(feature.geometry))
+            for inner, geometry in _geometries(feature.geometry, f"{where}.geometry"):
+                shapes = _shapes(geometry, f"{path}: {inner}")
+                if geometry is not feature.geometry and _foreign(geometry):
+                    places.append(Place(inner, properties | _foreign(geometry), [*shapes]))
+                else:
+                    place.shapes.extend(shapes)
+        places.append(place)
     return Places(True, places)
+
+
+def _foreign(part: _Feature | _Geometry) -> dict[str, Any]:
+    """The members of a part of a file that GeoJSON does not know."""
+    members = part.model_extra or {}
+    return {name: value for name, value in members.items() if name not in ("type", "bbox")}
+
+
+def _geometries(geometry: _Geometry, place: str) -> Iterator[tuple[str, _Geometry]]:
+    """The geometries of a feature, the inner ones first, each with where it stands."""
+    for number, inner in enumerate(geometry.geometries):
+        where = f"{place}.geometries.{number}"
+        yield from _geometries(validated(_Geometry, inner, where), where)
+    yield place, geometry
 
 
 def _shapes(geometry: _Geometry, place: str) -> Iterator[Shape]:
     """The parts of a geometry of GeoJSON, those that are empty left out."""
-    for number, inner in enumerate(geometry.geometries):
-        where = f"{place}.geometries.{number}"
-        yield from _shapes(validated(_Geometry, inner, where), where)
     kind = geometry.type.removeprefix("Multi")
     place = f"{place}.coordinates"
     parts = {place: geometry.coordinates}

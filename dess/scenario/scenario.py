@@ -28,7 +28,12 @@ from dess.base.errors import InputError, check_type, form_of, shown, unknown_nam
 from dess.base.files.reading import Shipped, parse_toml
 from dess.physics.fleet import UavType
 from dess.physics.section import Integer, Section, tuples
-from dess.scenario.consistency import problems
+from dess.scenario.consistency import (
+    TOLD_ERROR,
+    distance_error,
+    distance_sentence,
+    problems,
+)
 from dess.scenario.data_sheet import OPEN, DataSheet
 from dess.scenario.families import FAMILIES, is_generated, sea_of
 from dess.scenario.fields import (
@@ -46,7 +51,7 @@ from dess.scenario.fields import (
     is_number,
     merged,
 )
-from dess.scenario.no_fly import notes_after
+from dess.scenario.no_fly import notes_after, tell
 from dess.scenario.nodes import AMOUNTS
 from dess.scenario.own_sea import OwnSea, Positions, unread
 
@@ -282,7 +287,10 @@ def _of_values(
         of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
         values = merged(placed, read_values)
         values = merged(values, of_nodes)
-    return validated(ScenarioSpace, values, where, context)
+    space = validated(ScenarioSpace, values, where, context)
+    if not is_scenario_name(str(name_or_path)) and distance_error(space) >= TOLD_ERROR:
+        tell(f"{where}: {distance_sentence(space)}")
+    return space
 
 
 def positions_in(name_or_path: str | Path, /, **overrides: Any) -> Positions:

@@ -23,6 +23,7 @@ from pydantic import (
     model_validator,
 )
 
+from dess.base.elementary import log10
 from dess.base.errors import InputError, shown, validated
 from dess.base.files.documents import Document, Sha256
 from dess.base.files.reading import Shipped
@@ -429,21 +430,25 @@ class Description(Document):
 
 
 _PLACES = {"grid", "rows", "cell_size", "max_slots", "zones.pads", "wind.seed"}
+# The SNR of a scenario is given at a distance of its own, and compared at this one.
+_SNR, _SNR_DISTANCE = "SNR at 1 km [dB]", 1000.0
 
 
 def field_ranges(spaces: Iterable[ScenarioSpace]) -> dict[str, list[float]]:
     """The least and the largest value of each numeric field in the missions of scenarios.
 
-    Left out is what decides nothing, as rewards, or cannot be compared by a range, as the map.
+    Left out is what decides nothing, as rewards, or cannot be compared by a range, as the map. In
+    the place of ``edge_snr`` stands the mean SNR at 1 km.
     """
     ranges: dict[str, list[float]] = {}
     for space in spaces:
-        for field in space.numeric:
-            if field in _PLACES or "reward" in field:
+        fields = {field: space.value(field) for field in space.numeric if field not in _PLACES}
+        fields["pads"] = space.charging_pads
+        loss = 10 * space.path_loss_exponent * log10(_SNR_DISTANCE / space.snr_distance)
+        fields[_SNR] = round(fields.pop("edge_snr") - loss, 1)
+        for field, value in fields.items():
+            if "reward" in field:
                 continue
-            value = space.value(field)
-            if field == "pads":
-                value = space.charging_pads
             if not isinstance(value, tuple):
                 value = (value,)
             values = [*value, *ranges.get(field, [])]

@@ -89,6 +89,7 @@ def show_scenario(
     """
     from dess.analysis.names import declared_fields
     from dess.analysis.sheet import sheet_facts, sheet_lines
+    from dess.scenario.consistency import distance_error, distance_sentence
     from dess.scenario.scenario import draft_scenario, scenario_description
 
     console.check_ending("--figure", figure, FIGURES, "a picture")
@@ -106,6 +107,8 @@ def show_scenario(
         if space.units:
             shown["units"] = space.units._asdict()
             shown["follows"] = sheet_facts(space)
+        if space.centre:
+            shown["distance_error"] = distance_error(space)
         print(json.dumps(shown, indent=2))
         return
     if description:
@@ -114,6 +117,8 @@ def show_scenario(
         console.print_text(str(space.units))
         for line in sheet_lines(space):
             console.print_text(line)
+    if space.centre:
+        console.print_text(distance_sentence(space))
     if everything:
         for f in declared_fields(space):
             default = "no default"

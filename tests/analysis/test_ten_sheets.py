@@ -82,7 +82,8 @@ def steps_of(sheet: dict[str, Any]) -> list[tuple[float, float]]:
     duty = number(sheet, "duty_cycle", 100) / 100
     if sheet.get("modulation") == "lora":
         bandwidth = number(sheet, "bandwidth")
-        return [(snr, duty * sf * bandwidth / 2**sf * 4 / 5) for sf, snr in LORA.items()]
+        bits = {sf: sf - 2 * (2**sf / bandwidth >= 0.016) for sf in LORA}
+        return [(snr, duty * bits[sf] * bandwidth / 2**sf * 4 / 5) for sf, snr in LORA.items()]
     return [(in_units(snr), duty * in_units(rate)) for snr, rate in sheet.get("rates", ())]
 
 

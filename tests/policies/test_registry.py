@@ -1,5 +1,6 @@
 """From names to policies, the shipped ones and those of outside packages."""
 
+import math
 import pickle
 import sys
 from pathlib import Path
@@ -210,6 +211,23 @@ def test_which_policies_are_python_files_is_known_without_running_them(tmp_path,
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.python_files_in(team) == []
     assert "trap" not in sys.modules
+
+
+def test_snrs_are_compared_at_the_same_distance():
+    """The SNR of the paper at 1 km, given there, at 2 km, and 10 dB more than that."""
+    at_1_km = -25 + 22.7 * math.log10(math.sqrt(2) / 2 * 32 * 0.8)
+    for anchor, snr, is_told in (
+        (1000.0, at_1_km, False),
+        (2000.0, at_1_km - 22.7 * math.log10(2), False),
+        (2000.0, at_1_km - 22.7 * math.log10(2) + 10, True),
+        (1000.0, -25.0, True),  # that of the paper, but 18 km away
+    ):
+        space = ScenarioSpace.of(edge_snr=snr, radio={"anchor": anchor})
+        lines = registry.list_departures(["any", "ddqn"], [space])
+        assert bool(lines) is is_told
+        assert all(": SNR at 1 km" in line for line in lines)
+    [line] = registry.list_departures(["ddqn"], [space])
+    assert line.endswith("its training: SNR at 1 km [dB] -25 (trained on 3.6)")
 
 
 def test_a_rate_in_steps_is_outside_of_every_training():

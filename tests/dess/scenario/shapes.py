@@ -1,12 +1,15 @@
 """Shapes of GeoJSON, and a small grid at the equator."""
 
+import math
 from typing import Any
 
-from dess.scenario.places import Projection
+from dess.scenario.places import EARTH_RADIUS, Projection
 
 # A cell is a hundredth of a degree of latitude and, at the equator, of longitude; 0, 0 is the
 # centre of the grid.
 CELL = 1111.95
+# Cells of exactly this size, so that what has hundredths of degrees lies on edges of cells.
+EXACT = Projection((0.0, 0.0), (8, 6), math.radians(0.01) * EARTH_RADIUS)
 EQUATOR = Projection((0.0, 0.0), (8, 6), CELL)
 
 

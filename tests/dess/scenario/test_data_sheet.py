@@ -100,12 +100,40 @@ def _bits_per_second(snr: float, **sheet: Any) -> float:
         (30, 5468.75),  # 7 * 125,000 / 2^7 * 4/5
         (-7.5, 5468.75),
         (-7.501, 3125),  # 8 * 125,000 / 2^8 * 4/5
-        (-20, 292.96875),  # 12 * 125,000 / 2^12 * 4/5
+        (-15, 976.5625),  # 10 * 125,000 / 2^10 * 4/5
+        (-17.5, 439.453125),  # symbols of 16.4 ms: (11 - 2) * 125,000 / 2^11 * 4/5
+        (-20, 244.140625),  # (12 - 2) * 125,000 / 2^12 * 4/5
         (-20.001, 0),
     ],
 )
 def test_lora_has_the_rates_of_its_spreading_factors(snr, rate):
     assert _bits_per_second(snr, modulation="lora") == pytest.approx(rate)
+
+
+def test_symbols_of_lora_lose_two_bits_from_16_ms_on():
+    """At 250 kHz those of spreading factor 12 alone; at 128 kHz that of 11 takes 16 ms exactly."""
+    for bandwidth, factor_12, factor_11 in (
+        (250_000, 10 * 250e3 / 4096 * 0.8, 11 * 250e3 / 2048 * 0.8),
+        (128_000, 10 * 128e3 / 4096 * 0.8, 9 * 128e3 / 2048 * 0.8),
+        (500_000, 12 * 500e3 / 4096 * 0.8, 11 * 500e3 / 2048 * 0.8),
+    ):
+        space = _space({"modulation": "lora", "bandwidth": f"{bandwidth} Hz"})
+        rates = [efficiency * bandwidth for _, efficiency in space.radio.steps]
+        assert rates[:2] == pytest.approx([factor_12, factor_11])
+
+
+def test_packets_of_lora_take_the_time_on_air_of_the_chip():
+    """The times of Semtech's calculator at 125 kHz, 4/5, 8 symbols of preamble [ms]."""
+    for packet, factor_12, factor_7 in (("51 B", 2465.79, 102.66), ("13 B", 1155.07, 46.34)):
+        space = _space({"modulation": "lora", "packet": packet})
+        bits = 8 * float(packet.split()[0])
+        slowest, *_, fastest = (efficiency * 125e3 for _, efficiency in space.radio.steps)
+        assert 1000 * bits / slowest == pytest.approx(factor_12, abs=0.01)
+        assert 1000 * bits / fastest == pytest.approx(factor_7, abs=0.01)
+    # 222 bytes and a header of 13 take 368.9 ms with factor 7; 51 and 13 take 2,793.47 with 12.
+    sheet = _space({"modulation": "lora"}).data_sheet
+    assert sheet.lorawan_overhead(7) == pytest.approx(5468.75 * 0.368896 / (8 * 222))
+    assert sheet.lorawan_overhead(12) == pytest.approx(244.140625 * 2.793472 / (8 * 51))
 
 
 def test_a_node_is_served_at_the_highest_step_that_its_snr_reaches():
@@ -419,6 +447,12 @@ def test_a_quantity_of_another_library_is_refused_in_a_line(field):
         ({"rates": [["0 dB", "1 kbit/s"]], "modulation": "lora"}, {}, "is given beside rates"),
         ({"rates": [["0 dB", "1 kbit/s"]], "max_rate": "6 bit/s/Hz"}, {}, "beside rates"),
         ({"modulation": "lora", "max_rate": "6 bit/s/Hz"}, {}, "is given beside lora"),
+        (
+            {"packet": "51 B"},
+            {},
+            "packet: '51 B' is of lora; allowed: modulation = \"lora\", or no",
+        ),
+        ({"modulation": "lora", "packet": "12 bit"}, {}, "'12 bit' is no whole number of bytes"),
         ({"modulation": "fsk"}, {}, "modulation: 'fsk' is unknown"),
         (
             {"modulation": "lora", "bandwidth": "20 MHz"},

@@ -6,6 +6,7 @@ The files are small ones of the same kinds as those that were tried.
 import hashlib
 import json
 import logging
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,12 @@ from dess.model.batch import simulate_batch
 from dess.physics.chart import chart_at, spread
 from dess.policies import load_team
 from dess.scenario import no_fly
+from dess.scenario.consistency import distance_error
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile, NodesFound
 from dess.scenario.places import Projection
 from tests import compiled
-from tests.dess.scenario.shapes import CELL, EQUATOR, box, collection, feature
+from tests.dess.scenario.shapes import CELL, EQUATOR, EXACT, box, collection, feature
 
 Sea = Callable[..., Path]
 
@@ -50,7 +52,7 @@ def sea(tmp_path):
 def closed(path: Path, projection: Projection, **source: Any) -> np.ndarray:
     """(H, W) the no-fly cells of a file."""
     source_of = NoFlyFile(file=path.name, **source)
-    return no_fly.no_fly_in(path, projection.size, projection, source_of)
+    return no_fly.no_fly_in(path, projection.size, projection, source_of, altitude=10.0)
 
 
 def test_the_charts_of_shipped_seas_are_those_of_before():
@@ -120,11 +122,48 @@ def test_lines_are_lanes_and_everything_can_have_a_buffer(sea, tmp_path):
         return [*np.unique(np.argwhere(closed(line, EQUATOR, **source))[:, 0])]
 
     assert rows() == [2]  # without a width, what it touches
-    assert rows(width=0.5 * CELL) == []
+    assert rows(width=0.5 * CELL) == [2]  # a lane is never less than the line
     assert rows(width=0.7 * CELL) == [2]
     assert rows(width=0.2 * CELL, buffer=0.7 * CELL) == [2, 3]
     assert closed(rock, EQUATOR).sum() == 1
     assert closed(rock, EQUATOR, buffer=1.1 * CELL).sum() == 5  # its cell and the four beside it
+
+
+EDGES: dict[str, tuple[str, Any, bool, list[tuple[int, int]]]] = {
+    "a line": ("LineString", [[-1, 0], [1, 0]], False, [(x, y) for y in (2, 3) for x in range(8)]),
+    "a line, touched": (
+        "LineString",
+        [[0, -1], [0, 0.011]],
+        True,
+        [(x, y) for x in (3, 4) for y in range(1, 6)],
+    ),
+    "at the rim": ("LineString", [[-1, -0.03], [1, -0.03]], False, [(x, 5) for x in range(8)]),
+    "half of a line": (
+        "LineString",
+        [[-0.05, 0.005], [-0.02, 0], [0.05, 0]],
+        False,
+        [(0, 2), (1, 2), (1, 3), *((x, y) for y in (2, 3) for x in range(2, 8))],
+    ),
+    "a point": ("Point", [-0.02, 0.01], False, [(1, 1), (2, 1), (1, 2), (2, 2)]),
+    "a polygon": ("Polygon", [box(-0.02, -0.01, 0.01, 0)], False, [(2, 3), (3, 3), (4, 3)]),
+    "a polygon, touched": ("Polygon", [box(-0.02, -0.01, 0.01, 0)], True, [(2, 3), (3, 3), (4, 3)]),
+    "a polygon of no width": (
+        "Polygon",
+        [box(-0.015, 0, 0.015, 0)],
+        True,
+        [(x, y) for y in (2, 3) for x in (2, 3, 4, 5)],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "coordinates", "touched", "cells"), EDGES.values(), ids=EDGES)
+def test_what_lies_on_an_edge_of_cells_touches_both_sides(
+    kind, coordinates, touched, cells, sea, tmp_path
+):
+    """A polygon ends at its border: the cells beyond its edges stay open."""
+    sea(lane_json=collection(feature(kind, coordinates)))
+    found = np.argwhere(closed(tmp_path / "lane.json", EXACT, touched=touched))
+    assert sorted((x, y) for y, x in found.tolist()) == sorted(cells)
 
 
 def test_a_point_with_a_radius_is_a_circle(sea, tmp_path, caplog):
@@ -146,6 +185,99 @@ def test_a_point_with_a_radius_is_a_circle(sea, tmp_path, caplog):
     with caplog.at_level(logging.WARNING):
         assert closed(tmp_path / "cells.csv", EQUATOR).sum() == 1
     assert "cells.csv: the column radius is not used" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "said", [{"radius_m": "1223"}, {"Radius (m)": 1223}, {"RADIUS_KM": 1.22}, {"radius nm": 0.66}]
+    + [{"radius [ft]": "4010"}, {"zone": {"radius": "1.22 km"}}, {"radius": 9, "radius_m": 1223}],
+)  # fmt: skip
+def test_columns_of_radii_have_units_in_their_names(said, sea, tmp_path):
+    sea(rock_json=collection(feature("Point", [0.005, 0.005], **said)))
+    assert closed(tmp_path / "rock.json", EQUATOR).sum() == 5
+
+
+def test_zones_of_ed_318_are_read_with_their_extent_and_layer(sea, tmp_path, caplog):
+    """Also where the parts of a collection have their own."""
+    circle = feature("Point", [0.005, 0.005])
+    circle["geometry"]["extent"] = {"subType": "Circle", "radius": 1.1 * CELL}
+    circle["geometry"]["layer"] = {"lower": 0, "lowerReference": "AGL", "upper": 120, "uom": "m"}
+    sea(zone_json=collection(circle))
+    assert closed(tmp_path / "zone.json", EQUATOR).sum() == 5
+    high = {**circle["geometry"], "coordinates": [0.035, 0.005], "layer": {"lower": 300}}
+    both = feature("GeometryCollection", [])
+    both["geometry"]["geometries"] = [circle["geometry"], high]
+    sea(zones_json=collection(both))
+    with caplog.at_level(logging.WARNING):
+        assert closed(tmp_path / "zones.json", EQUATOR).sum() == 5 + 4
+    [note] = caplog.messages
+    assert "limits of altitude features.0.geometry.geometries.1 lie above or below" in note
+
+
+@pytest.mark.parametrize(
+    ("said", "is_told"),
+    [
+        ({"lower": 0, "upper": 120}, False),
+        ({"lower": "GND", "upper": "FL100"}, False),
+        ({"lower": "300 m"}, True),
+        ({"lowerLimit": {"value": 1000, "unit": 1, "referenceDatum": 1}}, True),
+        ({"lower_limit_height": 30, "lower_limit_unit": "FT", "lower_limit_ref": "AGL"}, False),
+        ({"lower_limit_height": 40, "lower_limit_unit": "FT"}, True),
+        ({"floor": 1, "floor_unit": "FL"}, True),
+        ({"upper": 5, "uom": "m"}, True),
+    ],
+)  # fmt: skip
+def test_zones_above_the_uavs_are_told(said, is_told, sea, tmp_path, caplog):
+    """They close their cells; the UAVs fly 10 m high."""
+    sea(zone_json=collection(feature("Point", [0.005, 0.005], **said)))
+    with caplog.at_level(logging.WARNING):
+        assert closed(tmp_path / "zone.json", EQUATOR).sum() == 1
+    assert ("features.0 lie above or below the UAVs, 10 m high" in caplog.text) is is_told
+
+
+def test_what_a_file_says_of_extent_and_is_not_read_is_told(sea, tmp_path, caplog):
+    lane = feature("LineString", [[-1, 0], [1, 0]], width_m=500, radius=40)
+    sea(
+        a_json=collection(lane, feature("Point", [0, 0], Diameter=30, radius=2)),
+        b_csv="x,y,radius_m\n3,3,500\n",
+        c_txt="........\n" * 6,
+        d_json=collection(
+            feature("Polygon", [[[-1, 0.001], [1, -0.03], [1, -0.025], [-1, 0.001]]])
+        ),
+    )
+    with caplog.at_level(logging.WARNING):
+        closed(tmp_path / "a.json", EQUATOR, colours=("#00ff00",))
+        closed(tmp_path / "b.csv", EQUATOR, touched=True)
+        closed(tmp_path / "c.txt", EQUATOR, buffer=100.0, width=3.0)
+        closed(tmp_path / "d.json", EQUATOR)
+    notes = [line.partition(": ")[2].partition(": ")[2] for line in caplog.messages]
+    assert [line.replace(f"{tmp_path}/", "") for line in notes] == [
+        "a.json is a file of places, for which colours has no effect",
+        "a.json: Diameter, radius, width_m of its places is not read; width and buffer are",
+        "b.csv is a table of cells, for which touched has no effect",
+        "b.csv: the column radius is not used, since its places are cells and no degrees",
+        "c.txt is a map, for which buffer, width has no effect",
+        "d.json: features.0 are narrower than a cell at places that stay open; touched = true "
+        "closes all cells that they touch",
+    ]
+
+
+def test_where_that_takes_nothing_is_refused(sea, tmp_path):
+    land = collection(
+        feature("Point", [0, 0], country="DK"), feature("Point", [0, 0], country="DE")
+    )
+    sea(land_json=land)
+    for where, line in (
+        (
+            {"country": "dk"},
+            "where: no place has country = 'dk' .did you mean DK.*; allowed: DK, DE",
+        ),
+        ({"Country": "DK"}, "has no Country .did you mean country.*; allowed: id, country"),
+        ({"country": "DK", "id": "7"}, "where: no place has id = '7'; allowed: None"),
+    ):
+        with pytest.raises(InputError, match=line):
+            closed(tmp_path / "land.json", EQUATOR, where=where)
+        with pytest.raises(InputError, match=line):
+            NodesFound.read(tmp_path / "land.json", NodesFile(file="land.json", where=where))
 
 
 def test_a_note_is_not_told_before_a_refusal(sea, caplog):
@@ -317,7 +449,7 @@ def test_marks_folders_and_backslashes(sea, tmp_path):
 # --- maps of the field ---
 
 
-def test_maps_of_the_field(sea, tmp_path):
+def test_maps_of_the_field(sea, tmp_path, caplog):
     """The header and letters of the MAPF benchmark, a blank first line, colours of a picture."""
     benchmark = "type octile\nheight 2\nwidth 3\nmap\n.@T\nGSW\n"
     pixels = np.zeros((2, 3, 3), np.uint8)
@@ -332,8 +464,19 @@ def test_maps_of_the_field(sea, tmp_path):
         assert np.argwhere(found[name]).tolist() == [[0, 1], [0, 2]]
     green = closed(tmp_path / "c.png", grid, colours=("#00ff00",))
     assert np.argwhere(green).tolist() == [[1, 2]]
+    with caplog.at_level(logging.WARNING):
+        closed(tmp_path / "c.png", grid)
+    assert "c.png: 1 pixels of #00ff00 close no cell; colours says which do" in caplog.text
     lines = 'zone = "c.png"\nno_fly = "c.png"\ngrid = 3\nrows = 2\nnodes = [[0, 0]]\nuavs = 1\n'
     assert load_scenario(sea(lines)).zone == (0, 1, 1, 1)
+    pixels[:, 0] = (0, 0, 255)
+    pixels[0, 1] = (0, 0, 255)
+    Image.fromarray(pixels).save(tmp_path / "c.png")
+    with pytest.raises(InputError, match=r"blue pixels at x 0..1, y 0..1 do not fill their rect"):
+        load_scenario(sea(lines))
+    Image.fromarray(0 * pixels).save(tmp_path / "c.png")
+    with pytest.raises(InputError, match="has no blue pixels, of which zones are; allowed: one"):
+        load_scenario(sea(lines))
     with pytest.raises(InputError, match="has 3 x 2 pixels; allowed: 4 x 2, as grid"):
         closed(tmp_path / "c.png", EQUATOR._replace(size=(4, 2)))
     with pytest.raises(InputError, match="d.png: is no picture"):
@@ -366,6 +509,26 @@ def test_all_bad_nodes_are_named_at_once(sea):
         load_scenario(sea(lines + islands, n_csv=table))
     with pytest.raises(InputError, match=r"line 4 \(C\) at \[7, 7\], line 5 \(D\) at .* off the"):
         load_scenario(sea(lines.replace("8", "5"), n_csv=table))
+
+
+def test_the_error_of_distances_is_told_and_refused(sea, caplog):
+    """Along the parallel at 60 + d degrees they are too long by cos(60) / cos(60 + d)."""
+    lines = 'nodes = "n.csv"\ngrid = 60\ncell_size = 8000\nzone = [30, 30, 1, 1]\nuavs = 1\n'
+
+    def load(half: float) -> Any:
+        return load_scenario(sea(lines, n_csv=f"lon,lat\n8,{60 - half}\n8,{60 + half}\n"))
+
+    def error(half: float) -> float:
+        return math.cos(math.radians(60)) / math.cos(math.radians(60 + half)) - 1
+
+    with caplog.at_level(logging.WARNING):
+        assert distance_error(load(0.3)) == pytest.approx(error(0.3), abs=1e-3)
+        assert not caplog.messages
+        assert distance_error(load(1.0)) == pytest.approx(error(1.0), abs=1e-3)
+    assert "sea.toml: distances between nodes and zones are up to 3 % wrong" in caplog.text
+    with pytest.raises(InputError, match=r"centre: distances .* up to 6\.. % wrong.*less than 5 %"):
+        load(2.0)
+    assert distance_error(load_scenario("paper")) == 0
 
 
 def test_charging_zones_are_places_on_the_earth(sea):

@@ -30,7 +30,7 @@ def no_fly_in(
     path: Path, size: Size, projection: Projection | None, **source: Any
 ) -> tuple[Cell, ...]:
     """The no-fly cells of a file, row by row."""
-    closed = no_fly.no_fly_in(path, size, projection, NoFlyFile(file=path.name, **source))
+    closed = no_fly.no_fly_in(path, size, projection, NoFlyFile(file=path.name, **source), 10.0)
     return tuple((x, y) for y, x in np.argwhere(closed).tolist())
 
 

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from dess import load_scenario
+from dess.scenario.new_sea import NewScenario
 
 BUOYS = "name,lon,lat\nA,8.10,54.00\nB,8.15,54.03\nC,8.20,54.01\nD,8.12,54.06\n"
 ANSWERS = {
@@ -14,10 +15,14 @@ ANSWERS = {
 OTHERS = {
     "range": "2 km",
     "horizon": "",
+    "reserve": "20 %",
+    "hover": "",
+    "altitude": "60 m",
     "max_speed": "23 m/s",
     "wind": "8 m/s from SW",
     "uavs": "3",
     "pads": "",
+    "zone": "4 x 2",
     "no_fly": "",
 }
 
@@ -68,6 +73,7 @@ def test_what_is_missing_is_asked_a_question_a_line(dess, buoys, tmp_path, monke
     assert (
         space.radio.range == 2000 and space.consumption.slots[0][3] > 1000 and space.uavs == (3, 3)
     )
+    assert space.zone[2:] == (4, 2) and space.altitude == 60 and space.flying_time == (80, 80)
 
 
 def test_rates_are_given_as_a_list(dess, buoys, tmp_path, refusal):
@@ -92,6 +98,16 @@ def test_a_link_budget_takes_the_place_of_the_snr(dess, buoys, tmp_path, refusal
     assert "frequency: missing" in refusal("scenarios", "new", "b.toml", *buoys, *_set(answers))
 
 
+def test_lora_without_an_snr_is_asked_for_its_link_budget(buoys, tmp_path):
+    """And where free space ends, which is 1 m if nobody says it."""
+    new = NewScenario(tmp_path / "buoys.csv")
+    asked = new.questions({"modulation": "lora"})
+    assert [name for name in ("snr", *LINK_BUDGET) if name in asked] == [*LINK_BUDGET]
+    assert asked["free_space"][1] == ""
+    assert "free_space" not in new.questions({"modulation": "lora", "snr": "12 dB at 2 km"})
+    assert "free_space" not in new.questions({})
+
+
 def test_a_wrong_answer_is_asked_again_at_once(dess, buoys, monkeypatch):
     """A base as latitude and longitude, a wind that is too strong: before the next question."""
     replies = {
@@ -108,7 +124,8 @@ def test_a_wrong_answer_is_asked_again_at_once(dess, buoys, monkeypatch):
     monkeypatch.setattr("builtins.input", answer)
     sheet = {name: of for name, of in ANSWERS.items() if name != "base"}
     code, _, err = dess("scenarios", "new", "my.toml", *buoys, *_set(sheet))
-    assert code == 0 and asked[3:7] == ["wind", "wind", "base", "base"]
+    first = asked.index("wind")
+    assert code == 0 and asked[first : first + 4] == ["wind", "wind", "base", "base"]
     assert "is too strong for 15 m/s over ground" in err
     assert "base: '54.05, 8.18' is 5,911 km from the nearest node; allowed: longitude, then" in err
 
@@ -153,6 +170,8 @@ def test_nodes_are_merged_on_the_grid_that_is_written(dess, tmp_path, shift):
             ["endurance, base: missing; allowed: --set "],
         ),
         ({"base": "there"}, ["base: 'there' is no place; allowed: two numbers"]),
+        ({"zone": "wide"}, ["zone: 'wide' is no size; allowed: its cells from west to east"]),
+        ({"zone": "1x1", "uavs": "3"}, ["zone: '1x1' has 1 cells; allowed: 3 or more, as uavs"]),
         ({"uavs": "many"}, ["uavs: 'many' is out of range; allowed: 1..64"]),
         ({"enduranc": "35 min"}, ["enduranc: unknown key (did you mean endurance?)"]),
     ],
@@ -171,7 +190,7 @@ def test_what_follows_from_a_sheet_is_shown(dess, buoys, tmp_path):
     assert unreachable in out
     code, out, _ = dess("scenarios", "show", "far.toml")
     assert code == 0 and unreachable in out
-    assert "rates: 293 bit/s from -20 dB on, 537.1 bit/s from -17.5 dB on, " in out
+    assert "rates: 244.1 bit/s from -20 dB on, 439.5 bit/s from -17.5 dB on, " in out
     assert "messages of a node: 17.5 a slot" in out
     assert "without these nodes a collection ratio of 25.0 % is the highest" in out
     assert "not in the sheet, and assumed: altitude 10 m, message 1 kB" in out
