@@ -14,6 +14,7 @@ from dess.analysis.answers.settings.sobol import sobol_indices
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.differences import compare
+from dess.analysis.stats.verdict import BEST, ONLY, SEEN_BEST, SEEN_WORSE, TIED, WORSE
 from dess.analysis.study.design import Saltelli
 
 # Names only: nothing is simulated.
@@ -114,12 +115,12 @@ def test_policies_are_compared_on_common_replications():
     jitter = np.tile([0.19, 0.2], 15)
     results, means = stub(a=spread + jitter, b=spread, c=spread[::-1] - 0.3)
     verdicts = summary.add_verdicts(results, means)["verdict"].tolist()
-    assert verdicts == [summary.BEST, summary.WORSE, summary.WORSE]
+    assert verdicts == [BEST, WORSE, WORSE]
     results, means = stub(a=spread + 0.01, b=spread)
-    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [SEEN_BEST, SEEN_WORSE]
     results, means = stub(a=spread, b=spread[::-1])
-    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
-    assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [TIED] * 2
+    assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [ONLY]
 
 
 def test_an_allowance_for_failures_is_said_with_both_intervals():
