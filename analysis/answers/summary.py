@@ -24,9 +24,10 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import P_VALUES, compare
+from dess.analysis.stats.differences import P_VALUES, compare, difference_of_intervals
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
+    Interval,
     by_replication,
     level_after,
     summary,
@@ -46,6 +47,7 @@ from dess.analysis.tables import (
     format_counts,
     stack_by_policy,
 )
+from dess.policies.shipped import HEURISTICS
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -147,13 +149,14 @@ def means_by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
 
 
 def compare_with_paper(
-    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
+    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, Interval]]
 ) -> pd.DataFrame:
     """The metrics of every policy, with marks relative to the numbers that the paper prints.
 
     Args:
         estimates: Rows of ``dess.analysis.summary`` by ``policy``, and by ``uavs`` if needed.
-        printed: The printed numbers by number of UAVs (None for all missions), then by metric.
+        printed: The printed numbers by number of UAVs (None for all missions), then by metric;
+            one whose number of missions is not known is its own interval.
 
     Returns:
         A row of the printed numbers and a row per policy, with a column of text per metric and
@@ -174,7 +177,7 @@ def compare_with_paper(
             head = ""
             if uavs is not None:
                 head = f"I = {uavs}"
-            columns[METRICS[metric], head] = [numbers.format_percent(figures[metric]), *texts]
+            columns[METRICS[metric], head] = [format_printed(figures[metric]), *texts]
     if None in printed and len(of_home):
         texts = [numbers.format_estimate(row) for _, row in of_home.iterrows()]
         columns[metric_of(HOME).name, ""] = ["", *texts]
@@ -197,14 +200,22 @@ def way_home_in_words(means: pd.DataFrame) -> str:
     )
 
 
-def format_with_mark(estimate: Any, printed: float) -> str:
+def format_printed(printed: Interval) -> str:
+    """A printed number, with its interval if it has one."""
+    if printed.low < printed.high:
+        return numbers.format_interval(*printed)
+    return numbers.format_percent(printed.mean)
+
+
+def format_with_mark(estimate: Any, printed: Interval) -> str:
     """An estimate and its difference from a printed number: ``97.3 % [96.1, 98.1] +7.4 ▲``.
 
-    The mark tells where the whole interval lies relative to the printed number.
+    The mark tells whether the interval of this difference lies above 0 or below it.
     """
-    text = numbers.format_interval(estimate.mean, estimate.low, estimate.high)
-    mark = MARKS[position_of(estimate, printed)]
-    return f"{text} {numbers.format_difference(estimate.mean, printed)} {mark}"
+    own = Interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position_of(difference_of_intervals(own, printed))]
+    difference = numbers.format_difference(estimate.mean, printed.mean)
+    return f"{numbers.format_interval(*own)} {difference} {mark}"
 
 
 def metrics_of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
@@ -285,14 +296,16 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
 
 
 def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
-    """The learned policies of a study and its other policies, the best of each first."""
+    """The learned policies of a study and its heuristics, the best of each first.
+
+    Of a study without a heuristic that is part of dess, these are all other policies.
+    """
     trained = trained_policies_by_learner(results).values()
     learned = {policy for trainings in trained for policy in trainings}
     ranked = rank_policies(results.missions)
-    return (
-        [policy for policy in ranked if policy in learned],
-        [policy for policy in ranked if policy not in learned],
-    )
+    others = [policy for policy in ranked if policy not in learned]
+    heuristics = [policy for policy in others if policy in HEURISTICS]
+    return [policy for policy in ranked if policy in learned], heuristics or others
 
 
 def worst_missions(
@@ -614,13 +627,15 @@ def means_of_check(results: Results) -> pd.DataFrame:
     return summary(results.checks, by=["policy", "point"])
 
 
-def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> "Figure":
-    """A metric of every policy: means with intervals, and the paper's number as a line.
+def plot_performance(
+    summary: pd.DataFrame, metric: str, printed: Interval | None = None
+) -> "Figure":
+    """A metric of every policy: means with intervals, and the paper's number as a line and a band.
 
     Args:
         summary: Rows of ``dess.analysis.summary`` by ``policy``.
         metric: The metric.
-        printed: The paper's number.
+        printed: The paper's number with its interval.
     """
     from dess.analysis.figures import style
 
@@ -631,11 +646,12 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         for y, mean in enumerate(rows["mean"]):
             style.note_at_right(measure.write(mean), y, ax)
         if printed is not None:
+            ax.axvspan(printed.low, printed.high, **style.band(style.MUTED))
             ax.axvline(
-                printed,
+                printed.mean,
                 color=style.INK,
                 **PRINTED,
-                label=f"paper {measure.write(printed)}",
+                label=f"paper {measure.write(printed.mean)}",
                 zorder=1,
             )
         ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from math import hypot
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -359,6 +360,19 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     n = min(len(a), len(b))
     difference = float(np.mean(a) - np.mean(b))
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
+
+
+def difference_of_intervals(
+    mean: intervals.Interval, other: intervals.Interval
+) -> intervals.Interval:
+    """How much higher a mean is than another one, from their two intervals.
+
+    Source: R. G. Newcombe, Statistics in Medicine 17 (1998) 873-890, method 10.
+    """
+    difference = mean.mean - other.mean
+    below = hypot(mean.mean - mean.low, other.high - other.mean)
+    beyond = hypot(mean.high - mean.mean, other.mean - other.low)
+    return intervals.Interval(difference, difference - below, difference + beyond)
 
 
 def relative_change(
