@@ -35,6 +35,8 @@ TERMS = {
     "95 % intervals": "Wilson's for success; that of a bounded mean for the other shares, which is "
     "wider and not symmetric; Student's t with a correction for skewness for other means, and with "
     "an allowance for rare failures for differences",
+    "Peak age of information": "the mean of the ages just before a node is emptied. A node that no "
+    "UAV empties has no peak, but counts in the mean age, so the mean may lie above the peak",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")

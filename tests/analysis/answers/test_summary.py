@@ -200,6 +200,35 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
     assert set(summary.compare_learned_with_heuristic(alone)["about"]) == {"this checkpoint"}
 
 
+COPY = """
+from dess.policies.registry import load
+
+
+class CopyNet:
+    name = "copy_net"
+    weights = "of a network"
+
+    def __init__(self):
+        self.network = load("ddqn")
+
+    def act(self, view):
+        return self.network.act(view)
+"""
+
+
+def test_a_policy_of_a_user_with_weights_is_learned(tmp_path):
+    """It is no heuristic with which learned policies are compared."""
+    (tmp_path / "copied_network.py").write_text(COPY)
+    copy = f"{tmp_path}/copied_network.py:CopyNet"
+    study = load_study("table4", policies=["random", copy, "ddqn", "greedy"], missions=5)
+    results = run_study(study, tmp_path / "out")
+    assert trained_policies_by_learner(results) == {copy: [copy], "ddqn": ["ddqn"]}
+    learned, heuristics = summary.rank_learned_and_others(results)
+    assert {*learned} == {copy, "ddqn"} and heuristics[0] == "greedy"
+    table = summary.compare_learned_with_heuristic(results)
+    assert {*table["baseline"]} == {"greedy"} and {*table["learner"]} == {copy, "ddqn"}
+
+
 def test_what_is_said_of_the_guard_is_computed():
     """Policies under the guard may fail as well."""
     shares = {"greedy": 0.4, "random": 0.9, "random-unguarded": 0.01}
