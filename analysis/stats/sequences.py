@@ -2,7 +2,7 @@
 
 An interval for a fixed number of missions covers too seldom if its reader watches it grow narrower
 and stops when it pleases. A confidence sequence covers the mean at all numbers of missions at once
-with probability 1 - error, so it may be watched. For 100 to 600 missions it is 1.4 to 1.8 times as
+with probability 1 - error, so it may be watched. For 100 to 600 missions it is 1.3 to 1.8 times as
 wide as the interval of a mean for a fixed number, and 2.4 to 3.2 times as that of a paired
 difference.
 
