@@ -39,6 +39,8 @@ class Metric:
             known either. Of a cost, ``metric_in_missions`` finds it.
         grows: Whether it grows with the length of the mission, so that only missions of the same
             length are to be compared by it.
+        of_offered: Whether it is a part of the data that a mission has: a share of it is a share of
+            the collection ratio, and ``metric_in_missions`` finds its largest value.
     """
 
     column: str
@@ -53,6 +55,7 @@ class Metric:
     most: float = inf
     failure: float = 0.0
     grows: bool = False
+    of_offered: bool = False
 
     @property
     def range(self) -> tuple[float, float]:
@@ -212,10 +215,23 @@ def _time_metric(
 
 
 def _amount_metric(
-    column: str, name: str, unit: str = "", sheet_unit: str = "", less: bool = False
+    column: str,
+    name: str,
+    unit: str = "",
+    sheet_unit: str = "",
+    less: bool = False,
+    of_offered: bool = False,
 ) -> Metric:
     """A number that is not negative."""
-    return Metric(column, name, unit, less_is_better=less, sheet_unit=sheet_unit, least=0.0)
+    return Metric(
+        column,
+        name,
+        unit,
+        less_is_better=less,
+        sheet_unit=sheet_unit,
+        least=0.0,
+        of_offered=of_offered,
+    )
 
 
 # Numbers beyond the paper: those of ``OPERATIONS``, which only extended scenarios measure, and, if
@@ -243,9 +259,9 @@ _RECORDED = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
     _time_metric("uav_slots", "UAV-hours", horizons=0.0),
-    _amount_metric(COLLECTED, "Data collected", _DATA, "MB"),
-    _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
-    _amount_metric("residual", "Data left", _DATA, "MB", less=True),
+    _amount_metric(COLLECTED, "Data collected", _DATA, "MB", of_offered=True),
+    _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB", of_offered=True),
+    _amount_metric("residual", "Data left", _DATA, "MB", less=True, of_offered=True),
     _time_metric("charging_per_uav", "Charging per UAV", "min"),
     _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
@@ -295,13 +311,16 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
     Args:
-        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, and what
-            failures cost if they have ``MOST_LOST``, as the missions of results do.
+        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, what
+            failures cost if they have ``MOST_LOST``, and the most data if they have those of their
+            beginning and those that arrived, as the missions of results do.
         column: The column.
     """
     metric = metric_of(column)
     if metric.kind == "cost" and MOST_LOST in missions:
         return replace(metric, failure=float(missions[MOST_LOST].max()))
+    if metric.of_offered and {"initial", "arrived", COLLECTED} <= {*missions}:
+        return replace(metric, most=_most_data(missions, metric))
     longest = metric_of(MOST_SLOTS)
     if metric.is_in_sheet_unit:
         longest = longest.in_units
@@ -311,6 +330,19 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     if metric.is_in_sheet_unit:
         units = _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
     return metric.lasting(float(missions[longest.column].max()) * units)
+
+
+def _most_data(missions: pd.DataFrame, metric: Metric) -> float:
+    """The most data that a mission has, in the unit of a metric; infinite if it is not known."""
+    offered = missions["initial"] + missions["arrived"]
+    if metric.column.startswith("collected_per_uav"):
+        offered = offered / missions["uavs"]
+    if metric.is_in_sheet_unit:
+        some = missions[missions[COLLECTED] > 0]
+        offered = offered * (some[_IN_SHEET_UNIT[COLLECTED]] / some[COLLECTED]).max()
+    if offered.notna().any():
+        return float(offered.max())
+    return inf
 
 
 def in_either(*columns: str) -> list[str]:

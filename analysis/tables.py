@@ -11,13 +11,21 @@ from dess.analysis.metrics import (
     BESIDE,
     METRICS,
     PRODUCT,
+    metric_of,
 )
 from dess.analysis.names import field_named, value_text
 from dess.analysis.stats.intervals import LEVEL
-from dess.analysis.stats.verdict import MARKS, position_by_test
+from dess.analysis.stats.verdict import MARKS, judge_by_tests
 
 INTERVALS = f"{numbers.format_level(LEVEL)} intervals"
-MARKED = "▲ better, ▼ worse, ≈ inconclusive"
+MARKED = (
+    "▲ better, ▼ worse, △ and ▽ the same in what was seen, where a rare failure is not ruled out, "
+    "≈ inconclusive"
+)
+BARS = (
+    f"dark bars are {INTERVALS} of what was seen (Student's t), and their pale ends allow for rare "
+    "failures."
+)
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_PRINTED = 20  # the largest number of rows of a table that the terminal prints
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
@@ -80,20 +88,28 @@ def means_table(
     metrics: Sequence[str] = tuple(METRICS),
 ) -> Table:
     """Rows of ``dess.analysis.summary`` by policy: a column per metric, as those of the paper."""
-    return Table(estimate_cells(rows[rows["metric"].isin(metrics)], ["policy", "n"]), caption, rows)
+    index = ["policy", "n"]
+    shares = [metric for metric in metrics if metric_of(metric).in_percent]
+    cells = estimate_cells(rows[rows["metric"].isin(shares)], index)
+    for measure in map(metric_of, dict.fromkeys(metrics)):
+        if not measure.in_percent:
+            of_metric = rows[rows["metric"] == measure.column]
+            texts = numbers.estimates_as_text(of_metric, index, write=measure.written)
+            cells[measure.label] = texts[measure.column].to_numpy()
+    return Table(cells, caption, rows)
 
 
 def comparison_cells(rows: pd.DataFrame, of: str) -> pd.DataFrame:
     """Rows of ``dess.analysis.compare``: all differences, and the p-value of the product.
 
-    The mark of a difference says whether it is significant, by its adjusted p-value.
+    The mark of a difference is the verdict of ``judge_by_tests``.
 
     Args:
         rows: The rows. Those of ``dess.analysis.compare_learners`` have the prediction interval of
             the product of one new training as well; a single training has none.
         of: The column that tells what is compared.
     """
-    sides = map(position_by_test, rows["difference"], rows["p_adjusted"])
+    sides = judge_by_tests(rows)
     ends = rows[["difference", "low", "high"]].to_numpy()
     texts = [f"{numbers.format_points(*e)} {MARKS[s]}" for e, s in zip(ends, sides, strict=True)]
     heads = rows["metric"].map(METRICS)

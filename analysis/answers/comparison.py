@@ -31,7 +31,16 @@ from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs, for_choice
 from dess.analysis.stats.intervals import LEVEL, by_replication, share_interval, values_within
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, on_front, position_by_test
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_ABOVE,
+    SEEN_BELOW,
+    judge_by_tests,
+    on_front,
+)
 from dess.analysis.study.stopping import Text
 from dess.base.errors import unknown_name
 from dess.base.files.documents import Document
@@ -306,8 +315,21 @@ BINS = 5  # largest number of bins of a parameter
 LEAST = 10  # missions of a bin that is shown
 EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
 AHEAD, BEHIND = "ahead", "behind"
-VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
-COLOURS = {AHEAD: style.BETTER, BEHIND: style.WORSE, INCONCLUSIVE: style.MUTED}
+SEEN_AHEAD, SEEN_BEHIND = "ahead in what was seen", "behind in what was seen"
+VERDICTS = {
+    ABOVE: AHEAD,
+    SEEN_ABOVE: SEEN_AHEAD,
+    INCONCLUSIVE: INCONCLUSIVE,
+    SEEN_BELOW: SEEN_BEHIND,
+    BELOW: BEHIND,
+}
+COLOURS = {
+    AHEAD: style.BETTER,
+    SEEN_AHEAD: style.BETTER,
+    BEHIND: style.WORSE,
+    SEEN_BEHIND: style.WORSE,
+    INCONCLUSIVE: style.MUTED,
+}
 
 
 def varying_parameters(missions: pd.DataFrame) -> list[str]:
@@ -344,7 +366,8 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
         A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
         missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
         comparison: ``mean``, ``low``, ``high`` (by ``compare_pairs``, 95 %), ``p``, ``p_adjusted``
-        (Holm over all rows, Bonferroni for the choice of the pair), ``n`` and ``verdict``.
+        (Holm over all rows, Bonferroni for the choice of the pair), ``n``, ``student``,
+        ``p_student``, ``p_student_adjusted`` and ``verdict``.
     """
     rows = []
     for field in varying_parameters(missions):
@@ -355,12 +378,13 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
             value = names[code]
             ours, theirs = (values_within(part, PRODUCT + end, ()) for end in ("", OF_BASELINE))
             comparison = compare_pairs(ours, theirs, metric=PRODUCT)
-            rows.append((field, position, value, *comparison[:4], comparison.n))
-    columns = ["field", "position", "value", "mean", "low", "high", "p", "n"]
-    table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
-    table = for_choice(table, candidates)
-    sides = zip(table["mean"], table["p_adjusted"], strict=True)
-    return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
+            without = comparison.student, comparison.p_student
+            rows.append((field, position, value, *comparison[:4], comparison.n, *without))
+    ends = ["difference", "low", "high", "p", "n", "student", "p_student"]
+    table = pd.DataFrame(rows, columns=["field", "position", "value", *ends])
+    table = for_choice(add_adjusted(table, "holm"), candidates)
+    verdicts = [VERDICTS[verdict] for verdict in judge_by_tests(table)]
+    return table.rename(columns={"difference": "mean"}).assign(verdict=verdicts)
 
 
 def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
@@ -373,7 +397,9 @@ def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
     meanings = {
         AHEAD: f"{pair.policy} is ahead where a dot is blue",
         BEHIND: f"{pair.policy} is behind where a dot is orange",
-        INCONCLUSIVE: "a hollow dot is inconclusive",
+        SEEN_AHEAD: f"a hollow blue dot is ahead in what was seen, where {NOT_RULED_OUT}",
+        SEEN_BEHIND: f"a hollow orange dot is behind in what was seen, where {NOT_RULED_OUT}",
+        INCONCLUSIVE: "a hollow grey dot is inconclusive",
     }
     shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
     if not shown:
@@ -411,14 +437,12 @@ def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
-            if verdict == INCONCLUSIVE:
-                fillstyle = "none"
-            else:
+            if verdict in (AHEAD, BEHIND):
                 fillstyle = "full"
-            arms = style.error_bar_arms(part)
-            dot = style.dot_style((COLOURS[verdict], "o"))
-            ax.errorbar(part["position"], part["mean"], yerr=arms, linestyle="",
-                        **dot, fillstyle=fillstyle)  # fmt: skip
+            else:
+                fillstyle = "none"
+            dot = style.dot_style((COLOURS[verdict], "o")) | {"fillstyle": fillstyle}
+            style.plot_with_bars(part, part["position"], ax, linestyle="", **dot)
         ax.set_title(field_named(rows["field"].iloc[0]).label, parse_math=True)
         ax.set(ylabel="mean difference [points]", ylim=ends)
         ax.set_xticks(rows["position"], rows["value"])

@@ -213,18 +213,21 @@ def methods_sentence(rungs: pd.DataFrame) -> str:
     """
     by_rung = rungs.groupby("variant", sort=False)
     means = by_rung[FINAL].mean()
+    learned = by_rung[f"final_{SUCCESS}"].agg(lambda shares: int((shares > LEARNED).sum()))
+    trainings = by_rung.size()
     reached = [f"{numbers.format_percent(mean)} ({rung})" for rung, mean in means.items()]
     if len(reached) == 1:
         return f"Trainings reach a product of {reached[0]}."
-    learned = by_rung[f"final_{SUCCESS}"].agg(lambda shares: (shares > LEARNED).sum())
-    counts = [
-        f"{count} of {n} ({rung})"
-        for rung, count, n in zip(means.index, learned, by_rung.size(), strict=True)
-    ]
-    return (
-        f"Trainings reach a mean product of {reached[0]} and of {reached[-1]}. "
-        f"Of the trainings, {numbers.join_words(counts[:3])} learn to charge."
-    )
+    counts = [f"{learned[rung]} of {trainings[rung]} ({rung})" for rung in means.index]
+    ending = f"The mean product is {reached[-1]} in place of {reached[0]}."
+    learning_all = np.flatnonzero((learned == trainings).to_numpy())
+    if not len(learning_all):
+        return f"With no method do all trainings learn to charge. {ending}"
+    first = learning_all[0]
+    fewer = ""
+    if first:
+        fewer = f", but only {numbers.join_words(counts[:first])}"
+    return f"Of the trainings, {counts[first]} learn to charge{fewer}. {ending}"
 
 
 def difference_of_trainings(

@@ -26,7 +26,7 @@ from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare_pairs
 from dess.analysis.stats.intervals import LEVEL, by_replication
-from dess.analysis.tables import INTERVALS
+from dess.analysis.tables import BARS, INTERVALS
 
 _ENDS = ["difference", "low", "high"]
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
@@ -95,8 +95,8 @@ def compare_values(
     Returns:
         A row per pair: ``first`` and ``second`` (positions), ``difference`` (second - first) with
         ``low`` and ``high`` (95 % each), ``wide_low`` and ``wide_high`` (95 % for all pairs at
-        once, by Bonferroni), ``p``, ``p_adjusted`` (Holm, over the pairs) and ``n``, the number of
-        replications.
+        once, by Bonferroni), ``p``, ``p_adjusted`` (Holm, over the pairs), ``n``, the number of
+        replications, and ``student``, as in ``stats.differences.Paired``.
     """
     positions = table[table["field"] == field].groupby("point")["position"].first()
     missions = results.missions_of(policy)
@@ -110,8 +110,8 @@ def compare_values(
         samples = values[second].to_numpy(), values[first].to_numpy()
         pair, wide = (compare_pairs(*samples, level, metric) for level in (LEVEL, at_once))
         ends = pair.difference, pair.low, pair.high, wide.low, wide.high
-        rows.append((first, second, *ends, pair.p, pair.n))
-    columns = ["first", "second", *_ENDS, "wide_low", "wide_high", "p", "n"]
+        rows.append((first, second, *ends, pair.p, pair.n, pair.student))
+    columns = ["first", "second", *_ENDS, "wide_low", "wide_high", "p", "n", "student"]
     return add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
 
 
@@ -306,7 +306,8 @@ def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
         data = table[table["field"] == field]
         caption = (
             f"n = {counted_missions(data)} missions per point; bars are {INTERVALS}. The lowest "
-            "panel shows the paired difference from the first value, with an axis of its own."
+            "panel shows the paired difference from the first value, with an axis of its own: "
+            f"{BARS}"
         )
         alt = f"The metrics against the {field_named(field).within}"
         yield Drawing(plot_effect(table, field, pairs, results.policies), alt, caption, data)

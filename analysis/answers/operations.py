@@ -30,8 +30,16 @@ from dess.analysis.names import value_text
 from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
-from dess.analysis.stats.intervals import LEVEL, by_replication, check_share
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_of
+from dess.analysis.stats.intervals import LEVEL, Interval, by_replication, check_share
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    INCONCLUSIVE,
+    SEEN_ABOVE,
+    SEEN_BELOW,
+    position_of,
+    position_with_allowance,
+)
 from dess.analysis.tables import WIDER, allowance_sentence
 
 # The published changes of the average age of information, from one UAV to this number, in another
@@ -268,20 +276,32 @@ def age_sentence(results: Results) -> str:
     ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
     changed = changes_from_reference(results, "uavs", few, AGE, relative=True)
     changed = changed[(changed["policy"] == results.policies[0]) & (changed["uavs"] == more)]
-    verbs = {ABOVE: "rises", BELOW: "falls", INCONCLUSIVE: "does not surely change,"}
+    verbs = {
+        ABOVE: "rises",
+        SEEN_ABOVE: "rises in what was seen",
+        INCONCLUSIVE: "does not surely change,",
+        SEEN_BELOW: "falls in what was seen",
+        BELOW: "falls",
+    }
     parts = []
     for rate in dict.fromkeys([ends.index.min(), ends.index.max()]):
         (change,) = changed[changed["arrival_rate"] == rate].itertuples()
         rows = ends.loc[[rate]].to_numpy()
         ages = [numbers.format_decimals(mean, low, high, digits=1) for mean, low, high in rows]
         parts.append(
-            f"{verbs[position_of(change)]} from {' to '.join(ages)} slots at an arrival rate of "
+            f"{verbs[_judge_change(change)]} from {' to '.join(ages)} slots at an arrival rate of "
             f"{value_text(rate)}"
         )
     return (
         f"From {few} to {more} UAVs the mean age of the data {numbers.join_words(parts)} "
         f"(policy {results.policies[0]}, n = {numbers.format_span(changed['n'])} missions)."
     )
+
+
+def _judge_change(change: Any) -> str:
+    """The verdict on a row of ``changes_from_reference``."""
+    seen = Interval(change.mean, change.mean - change.student, change.mean + change.student)
+    return position_with_allowance(position_of(change), position_of(seen))
 
 
 def published_age_in_words() -> str:

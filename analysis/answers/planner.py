@@ -21,14 +21,25 @@ from dess.analysis.results.resimulate import Mission
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import summary
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_of
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_ABOVE,
+    SEEN_BELOW,
+    judge_difference,
+)
+from dess.analysis.tables import BARS
 from dess.policies.planner import Course, Planner, first_plan
 from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 
 _CLAIMS = {
     ABOVE: "The planner is better",
+    SEEN_ABOVE: f"The planner is better in what was seen; {NOT_RULED_OUT}",
     BELOW: "The learner is better",
+    SEEN_BELOW: f"The learner is better in what was seen; {NOT_RULED_OUT}",
     INCONCLUSIVE: "The missions do not tell which is better",
 }
 
@@ -65,13 +76,17 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
     points = numbers.format_points(overall.difference, overall.low, overall.high)
+    verdict = judge_difference(overall)
     sentence = (
-        f"{_CLAIMS[position_of(overall)]}: the product of {planner} minus that of "
+        f"{_CLAIMS[verdict]}: the product of {planner} minus that of "
         f"{overall.baseline} is {points} points over {overall.n:,} missions."
     )
-    if position_of(overall) == INCONCLUSIVE:
+    if verdict == INCONCLUSIVE:
         return sentence, ""
-    return sentence, f"{numbers.format_difference(overall.difference, 0)} points"
+    number = f"{numbers.format_difference(overall.difference, 0)} points"
+    if verdict in (SEEN_ABOVE, SEEN_BELOW):
+        number += " in what was seen"
+    return sentence, number
 
 
 def by_fleet(table: pd.DataFrame) -> Drawing:
@@ -88,7 +103,7 @@ def by_fleet(table: pd.DataFrame) -> Drawing:
     return Drawing(
         figures.plot_differences(rows, names, f"Difference from {baseline}"),
         f"Paired differences from {baseline} in the product, by number of UAVs",
-        f"n = {numbers.format_span(rows['n'])} missions; bars are 95 % intervals.",
+        f"n = {numbers.format_span(rows['n'])} missions; {BARS}",
     )
 
 

@@ -20,19 +20,21 @@ from dess.analysis.metrics import (
     SUCCESS,
     metric_in_missions,
     metric_of,
+    ranking_column,
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare
+from dess.analysis.stats.differences import P_VALUES, compare, difference_of_intervals
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
+    Interval,
     by_replication,
     level_after,
     summary,
     values_within,
 )
 from dess.analysis.stats.learners import compare_learners
-from dess.analysis.stats.verdict import MARKS, may_be_best, position_of, within_reach
+from dess.analysis.stats.verdict import MARKS, ONLY, judge_alternatives, position_of
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
@@ -45,16 +47,15 @@ from dess.analysis.tables import (
     format_counts,
     stack_by_policy,
 )
+from dess.policies.shipped import HEURISTICS
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
 
 # How the numbers of the paper are drawn.
 PRINTED: dict[str, Any] = {"linestyle": "--", "linewidth": 1.3}
+_ENDS = ["mean", "low", "high"]
 UNGUARDED = "random-unguarded"  # the policy that acts without the return guard
-
-
-BEST, TIED, WORSE, ONLY = "best", "tied", "worse", "only"  # verdicts on a policy at a design point
 
 
 def means_of_points(results: Results) -> pd.DataFrame:
@@ -99,32 +100,23 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``means_of_points`` with a ``verdict``: how a policy compares with the others there.
 
     Compared are the policies of the table at the same design point, by each metric, on the
-    replications that they have in common, by ``stats.verdict.may_be_best``: at every design point
-    by itself, the truly best policy is ``BEST`` or ``TIED`` with a probability of 95 %.
+    replications that they have in common, by ``stats.verdict.judge_alternatives``.
 
     Args:
         results: The study.
         means: Rows of ``means_of_points``.
 
     Returns:
-        The rows, with ``BEST`` if the policy is significantly better than the others, ``TIED`` if
-        it is one of several that may be the best, ``WORSE`` if another one is significantly better,
-        ``ONLY`` if there is no other one.
+        The rows, with the verdicts of ``judge_alternatives``.
     """
     verdicts = pd.Series(ONLY, means.index, dtype=object)
     for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
-        if len(rows) > 1:
-            missions = results.missions[results.missions["point"] == point]
-            wide = by_replication(missions, str(metric), "policy")
-            looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-            measure = metric_in_missions(results.missions, str(metric))
-            may_be = may_be_best(wide[rows["policy"]].to_numpy(float), measure, looks)
-            may_be &= within_reach(rows["low"], rows["high"], measure).to_numpy()
-            if may_be.sum() > 1:
-                best = TIED
-            else:
-                best = BEST
-            verdicts[rows.index] = np.where(may_be, best, WORSE)
+        missions = results.missions[results.missions["point"] == point]
+        wide = by_replication(missions, str(metric), "policy")
+        values = wide[rows["policy"]].to_numpy(float)
+        looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
+        measure = metric_in_missions(results.missions, str(metric))
+        verdicts[rows.index] = judge_alternatives(values, rows["low"], rows["high"], measure, looks)
     return means.assign(verdict=verdicts)
 
 
@@ -157,13 +149,14 @@ def means_by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
 
 
 def compare_with_paper(
-    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
+    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, Interval]]
 ) -> pd.DataFrame:
     """The metrics of every policy, with marks relative to the numbers that the paper prints.
 
     Args:
         estimates: Rows of ``dess.analysis.summary`` by ``policy``, and by ``uavs`` if needed.
-        printed: The printed numbers by number of UAVs (None for all missions), then by metric.
+        printed: The printed numbers by number of UAVs (None for all missions), then by metric;
+            one whose number of missions is not known is its own interval.
 
     Returns:
         A row of the printed numbers and a row per policy, with a column of text per metric and
@@ -184,7 +177,7 @@ def compare_with_paper(
             head = ""
             if uavs is not None:
                 head = f"I = {uavs}"
-            columns[METRICS[metric], head] = [numbers.format_percent(figures[metric]), *texts]
+            columns[METRICS[metric], head] = [format_printed(figures[metric]), *texts]
     if None in printed and len(of_home):
         texts = [numbers.format_estimate(row) for _, row in of_home.iterrows()]
         columns[metric_of(HOME).name, ""] = ["", *texts]
@@ -207,14 +200,22 @@ def way_home_in_words(means: pd.DataFrame) -> str:
     )
 
 
-def format_with_mark(estimate: Any, printed: float) -> str:
+def format_printed(printed: Interval) -> str:
+    """A printed number, with its interval if it has one."""
+    if printed.low < printed.high:
+        return numbers.format_interval(*printed)
+    return numbers.format_percent(printed.mean)
+
+
+def format_with_mark(estimate: Any, printed: Interval) -> str:
     """An estimate and its difference from a printed number: ``97.3 % [96.1, 98.1] +7.4 ▲``.
 
-    The mark tells where the whole interval lies relative to the printed number.
+    The mark tells whether the interval of this difference lies above 0 or below it.
     """
-    text = numbers.format_interval(estimate.mean, estimate.low, estimate.high)
-    mark = MARKS[position_of(estimate, printed)]
-    return f"{text} {numbers.format_difference(estimate.mean, printed)} {mark}"
+    own = Interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position_of(difference_of_intervals(own, printed))]
+    difference = numbers.format_difference(estimate.mean, printed.mean)
+    return f"{numbers.format_interval(*own)} {difference} {mark}"
 
 
 def metrics_of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
@@ -295,14 +296,16 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
 
 
 def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
-    """The learned policies of a study and its other policies, the best of each first."""
+    """The learned policies of a study and its heuristics, the best of each first.
+
+    Of a study without a heuristic that is part of dess, these are all other policies.
+    """
     trained = trained_policies_by_learner(results).values()
     learned = {policy for trainings in trained for policy in trainings}
     ranked = rank_policies(results.missions)
-    return (
-        [policy for policy in ranked if policy in learned],
-        [policy for policy in ranked if policy not in learned],
-    )
+    others = [policy for policy in ranked if policy not in learned]
+    heuristics = [policy for policy in others if policy in HEURISTICS]
+    return [policy for policy in ranked if policy in learned], heuristics or others
 
 
 def worst_missions(
@@ -380,7 +383,9 @@ def correct_for_all_tests(results: Results, table: pd.DataFrame) -> pd.DataFrame
         results: The study.
         table: The comparisons, with ``p``.
     """
-    return table.assign(p_adjusted=(table["p"] * count_tests(results)).clip(upper=1))
+    count = count_tests(results)
+    corrected = {f"{name}_adjusted": (table[name] * count).clip(upper=1) for name in P_VALUES}
+    return table.assign(**corrected)
 
 
 def has_policies_to_compare(results: Results) -> bool:
@@ -566,9 +571,11 @@ def selected_settings(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
-        ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words, with
-        the ends of the values at which the point lies. Empty if the study selects nothing. For a
-        study that selects the cheapest setting, the rows of ``FleetSearch.selected_fleets``.
+        ``left`` (number of points not ruled out), ``guaranteed``, ``guarantee`` in words, with
+        the ends of the values at which the point lies, and the ``metric`` that it is selected by
+        with its ``mean``, ``low`` and ``high`` over the missions of the selection. Empty if the
+        study selects nothing. For a study that selects the cheapest setting, the rows of
+        ``FleetSearch.selected_fleets``.
     """
     if isinstance(results.study.selection, Cheapest):
         return search_of(results).selected_fleets()
@@ -578,9 +585,26 @@ def selected_settings(results: Results) -> pd.DataFrame:
         if (c := results.choice(policy)) is not None:
             selected = (policy, c.best, words[c.best], c.missions, len(c.survivors))
             lies = ends_sentence(results, c.best, ends_of_point(results, c.best))
-            rows.append((*selected, c.guaranteed, f"{c.guarantee}.{lies}" if lies else c.guarantee))
+            guarantee = f"{c.guarantee}.{lies}" if lies else c.guarantee
+            rows.append((*selected, c.guaranteed, guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
-    return pd.DataFrame(rows, columns=columns)
+    table = pd.DataFrame(rows, columns=columns)
+    if table.empty:
+        return table
+    metric = ranking_column(results.study.selection.metric, results.missions)
+    means = means_of_points(results)
+    ends = means.loc[means["metric"] == metric, ["policy", "point", "metric", *_ENDS]]
+    return table.merge(ends, on=["policy", "point"], how="left")
+
+
+def selected_by_cells(selected: pd.DataFrame) -> list[str]:
+    """What each setting was selected by, with its interval, as text.
+
+    Args:
+        selected: Rows of ``selected_settings``.
+    """
+    write = metric_of(selected["metric"].iloc[0]).written
+    return [write(*ends) for ends in selected[_ENDS].to_numpy(float)]
 
 
 def selection_table(results: Results) -> Table:
@@ -592,7 +616,10 @@ def selection_table(results: Results) -> Table:
         "Missions of the selection": format_counts(data["missions"]),
         "Settings not ruled out": data["left"],
     }
-    return Table(pd.DataFrame(cells), "The setting that was selected for every policy", data)
+    measure = metric_of(data["metric"].iloc[0])
+    cells[measure.label] = selected_by_cells(data)
+    caption = f"The setting that was selected for every policy by {measure.within}"
+    return Table(pd.DataFrame(cells), caption, data)
 
 
 def means_of_check(results: Results) -> pd.DataFrame:
@@ -600,13 +627,15 @@ def means_of_check(results: Results) -> pd.DataFrame:
     return summary(results.checks, by=["policy", "point"])
 
 
-def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> "Figure":
-    """A metric of every policy: means with intervals, and the paper's number as a line.
+def plot_performance(
+    summary: pd.DataFrame, metric: str, printed: Interval | None = None
+) -> "Figure":
+    """A metric of every policy: means with intervals, and the paper's number as a line and a band.
 
     Args:
         summary: Rows of ``dess.analysis.summary`` by ``policy``.
         metric: The metric.
-        printed: The paper's number.
+        printed: The paper's number with its interval.
     """
     from dess.analysis.figures import style
 
@@ -617,11 +646,12 @@ def plot_performance(summary: pd.DataFrame, metric: str, printed: float | None =
         for y, mean in enumerate(rows["mean"]):
             style.note_at_right(measure.write(mean), y, ax)
         if printed is not None:
+            ax.axvspan(printed.low, printed.high, **style.band(style.MUTED))
             ax.axvline(
-                printed,
+                printed.mean,
                 color=style.INK,
                 **PRINTED,
-                label=f"paper {measure.write(printed)}",
+                label=f"paper {measure.write(printed.mean)}",
                 zorder=1,
             )
         ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)

@@ -40,7 +40,16 @@ from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_of
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    INCONCLUSIVE,
+    MARKS,
+    NOT_RULED_OUT,
+    SEEN_ABOVE,
+    SEEN_BELOW,
+    judge_difference,
+)
 from dess.analysis.tables import Table
 
 if TYPE_CHECKING:  # figures need the extra reports
@@ -48,6 +57,12 @@ if TYPE_CHECKING:  # figures need the extra reports
 
 
 BASELINE, VARIATION = 0, 1  # the design points
+# What stands behind a difference that is not shown.
+_DOUBTS = {
+    SEEN_ABOVE: f" (higher in what was seen; {NOT_RULED_OUT})",
+    INCONCLUSIVE: " (inconclusive)",
+    SEEN_BELOW: f" (lower in what was seen; {NOT_RULED_OUT})",
+}
 SIDES = ("baseline", "variation")
 
 # Further quantities per mission, in addition to the paper's metrics.
@@ -158,21 +173,6 @@ def _compare_with_baseline(
     return pd.concat([table for table in tables if len(table)], ignore_index=True)
 
 
-def verdict_on_change(answer: Any) -> str:
-    """Whether the variation is significantly ``ABOVE`` or ``BELOW`` the baseline.
-
-    The complete interval has to be above or below 0. If it has no length, it tells nothing about
-    the variance, so the sign test must be significant as well.
-
-    Args:
-        answer: A row of ``compare_sides``.
-    """
-    is_estimated = answer.low < answer.high or answer.p <= 1 - LEVEL
-    if is_estimated:
-        return position_of(answer)
-    return INCONCLUSIVE
-
-
 def missions_needed(answer: Any) -> float:
     """The number of missions that would show a difference of the observed size.
 
@@ -219,14 +219,19 @@ def conclusion_in_words(answer: Any) -> str:
     """What a row of ``compare_sides`` says about the product, in Markdown."""
     words = {
         ABOVE: "is **higher** in the variation",
-        BELOW: "is **lower** in the variation",
+        SEEN_ABOVE: f"is **higher in what was seen** ({NOT_RULED_OUT})",
         INCONCLUSIVE: "is **inconclusive**",
+        SEEN_BELOW: f"is **lower in what was seen** ({NOT_RULED_OUT})",
+        BELOW: "is **lower** in the variation",
     }
-    verdict = verdict_on_change(answer)
+    verdict = judge_difference(answer)
+    missing = ""
+    if verdict not in (ABOVE, BELOW):
+        missing = _missing_in_words(answer)
     return (
         f"**{answer.policy}**: product {words[verdict]}, by {format_change(answer)} points: from "
         f"{numbers.format_percent(answer.before)} to {numbers.format_percent(answer.after)}."
-        f"{_missing_in_words(answer) if verdict == INCONCLUSIVE else ''}"
+        f"{missing}"
     )
 
 
@@ -305,10 +310,8 @@ class Variation:
         ]
         parts = []
         for row in self._of_product():
-            part = f"that of {row.policy} by {format_change(row)} points"
-            if verdict_on_change(row) == INCONCLUSIVE:
-                part += " (inconclusive)"
-            parts.append(part)
+            doubt = _DOUBTS.get(judge_difference(row), "")
+            parts.append(f"that of {row.policy} by {format_change(row)} points{doubt}")
         n = f"n = {numbers.format_span(row.n for row in self._of_product())} pairs"
         with_new = numbers.join_words(new)
         changes = f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."
@@ -384,10 +387,15 @@ class Variation:
         """How the intervals and marks that occur in the answer are read, in sentences."""
         table = self.table()
         table = table[table["metric"].isin([*METRICS])]
-        verdicts = [verdict_on_change(row) for row in table.itertuples()]
+        verdicts = [judge_difference(row) for row in table.itertuples()]
         sentences = []
         if INCONCLUSIVE in verdicts:
             sentences.append("A difference is inconclusive (≈) if its interval contains 0.")
+        if {SEEN_ABOVE, SEEN_BELOW} & {*verdicts}:
+            sentences.append(
+                "It is higher (△) or lower (▽) in what was seen if its interval contains 0 only "
+                "because it allows for failures that are too rare to be in these missions."
+            )
         if any(self._overlap(row.policy, row.metric) for row in self._clear(table, verdicts)):
             sentences.append(
                 "Intervals of the means may overlap although the paired difference is clear."
@@ -403,7 +411,7 @@ class Variation:
     def _clear(table: pd.DataFrame, verdicts: Sequence[str]) -> list[Any]:
         """The rows with a verdict."""
         rows = zip(table.itertuples(), verdicts, strict=True)
-        return [row for row, of_row in rows if of_row != INCONCLUSIVE]
+        return [row for row, of_row in rows if of_row in (ABOVE, BELOW)]
 
     def _overlap(self, policy: str, metric: str) -> bool:
         """Whether the intervals of the means of both sides overlap."""
@@ -454,7 +462,7 @@ class Variation:
             name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
             difference = ""
             if row.n:
-                difference = f"{MARKS[verdict_on_change(row)]} {format_change(row)}{unit}"
+                difference = f"{MARKS[judge_difference(row)]} {format_change(row)}{unit}"
             lines.append([name, *sides, difference])
         heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
         return pd.DataFrame(lines, columns=heads)

@@ -77,7 +77,8 @@ class Answer:
         Returns:
             A row per setting with ``rank``, ``policy``, ``point``, ``n`` missions, the swept
             fields, every metric with the ends of its 95 % interval (``success``, ``success_low``,
-            ``success_high``), and ``tied``: whether the setting may be as good as the best one.
+            ``success_high``), ``standing``: how the setting compares with the others, and ``tied``:
+            whether it may be as good as the best one by what was seen.
             With prices also ``cost`` with its interval, and its parts where costs are those of a
             year. With requirements also the ``verdict`` (``met``, ``missed`` or ``open``), and
             ``selected``: whether the setting is the selected one of its policy under its condition.

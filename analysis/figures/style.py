@@ -47,6 +47,7 @@ WIDTH, DPI = 5.2, 150  # inches, dots per inch
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
 # In all figures, blue means better, orange worse, and grey inconclusive.
 BETTER, WORSE = "#0173b2", "#c05000"
+PALE = 0.35  # the opacity of what a bar allows for rare failures
 ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference
 
 _LOOK = {
@@ -231,6 +232,26 @@ def error_bar_arms(
     return np.array([rows[mean] - rows[low], rows[high] - rows[mean]]).reshape(2, -1)
 
 
+def plot_with_bars(rows: pd.DataFrame, places: pd.Series, ax: Axes, **look: Any) -> None:
+    """Means with their intervals as bars, in two tones where rows have ``student``.
+
+    The dark part of a bar is Student's interval; its pale ends are what is allowed for failures
+    that are too rare to be in the missions.
+
+    Args:
+        rows: The rows, with ``mean``, ``low`` and ``high``, and with ``student`` or without it.
+        places: The places of the means on the horizontal axis.
+        ax: The axes to draw on.
+        look: Further arguments of ``Axes.errorbar``.
+    """
+    arms = error_bar_arms(rows)
+    if "student" in rows:
+        pale = {"linestyle": "", "ecolor": look["color"], "alpha": PALE, "capsize": look["capsize"]}
+        ax.errorbar(places, rows["mean"], yerr=arms, elinewidth=look["elinewidth"], **pale)
+        arms = np.fmin(arms, rows["student"].to_numpy(float))
+    ax.errorbar(places, rows["mean"], yerr=arms, **look)
+
+
 def side_by_side_shifts(count: int, half_width: float) -> np.ndarray:
     """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
     if count > 1:
@@ -325,9 +346,8 @@ def plot_along(
     curves = rows[line].map(value_text)
     for name, shift in zip(looks, side_by_side_shifts(len(looks), half_width), strict=True):
         means = rows[curves == name].sort_values("position")
-        arms = error_bar_arms(means)
-        ax.errorbar(means["position"] + shift, means["mean"], yerr=arms, label=name,
-                    linewidth=1, **dot_style(looks[name]) | options)  # fmt: skip
+        look = {"label": name, "linewidth": 1, **dot_style(looks[name]), **options}
+        plot_with_bars(means, means["position"] + shift, ax, **look)
     name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
     set_axis_unit(ax.yaxis, unit)
 

@@ -11,7 +11,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers import learning, main_effects, missions
 from dess.analysis.answers.learning import Transfer, last_phase, settling_position
-from dess.analysis.metrics import RATIO
+from dess.analysis.metrics import RATIO, SUCCESS
 from dess.analysis.names import field_named, value_text
 from dess.analysis.paper import values
 from dess.analysis.paper.rules import MARGIN
@@ -167,6 +167,7 @@ class EvidenceOfTrainings(NamedTuple):
 
 
 NO_RESULTS = "no results"
+TOO_SHORT = "; too short to tell"
 VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
 # The verdicts as pages write them. What holds matches the paper's number if the interval of the
 # difference from it reaches 0, and exceeds it if all of it is above 0; without a number, or if all
@@ -476,6 +477,26 @@ def level_from(judge: Judge, evidence: EvidenceOfTrainings, metric: str) -> Find
     return Finding(verdict, (level, *_at_the_end(transfer, "points")), note)
 
 
+def learning_to_charge(judge: Judge, evidence: EvidenceOfTrainings, variant: str) -> Finding:
+    """The share of the trainings of a variant that learn to charge."""
+    last = learning.last_rows(evidence.trainings)
+    of_variant = last[last["variant"] == variant]
+    if of_variant.empty:
+        raise MissingError(f"no trainings {variant}")
+    learned = of_variant[f"final_{SUCCESS}"].to_numpy() > learning.LEARNED
+    share = _share_of(learned, "trainings that learn to charge")
+    length = int(of_variant["updates"].max())
+    quantities = share, Quantity.exact(length, unit="steps", name="length of the trainings")
+    if length < values.CROSSING:
+        return Finding(INCONCLUSIVE, quantities, f"trainings {variant}{TOO_SHORT}")
+    return Finding(judge(share.interval), quantities, f"trainings {variant}")
+
+
+def untested(judge: Judge, evidence: EvidenceOfTrainings, reason: str) -> Finding:
+    """Nothing: what a claim would need has not been simulated, for a reason."""
+    raise MissingError(f"not tested: {reason}")
+
+
 def _at_the_end(transfer: Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
     """The last difference, and how long the trainings are."""
     last = Quantity(transfer.last, min(transfer.trainings), unit, "with transfer, at the end")
@@ -485,7 +506,7 @@ def _at_the_end(transfer: Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
 def _if_short(transfer: Transfer) -> str:
     if transfer.length >= values.CROSSING:
         return ""
-    return "; too short to tell"
+    return TOO_SHORT
 
 
 # Figures.

@@ -5,7 +5,6 @@ Each is a function from what a measure finds to one of ``VERDICTS``. Its words a
 """
 
 from collections.abc import Collection, Sequence
-from math import hypot
 
 import pandas as pd
 
@@ -14,6 +13,7 @@ from dess.analysis.answers.learning import Transfer
 from dess.analysis.answers.main_effects import Shape
 from dess.analysis.paper.values import CROSSING
 from dess.analysis.stats import verdict
+from dess.analysis.stats.differences import difference_of_intervals
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.study.selection import Choice
 
@@ -34,7 +34,7 @@ def all_above(limits: Sequence[float], *intervals: Interval) -> str:
 
 def reached(mean: Interval, printed: Interval) -> str:
     """Whether a printed number is reached."""
-    difference = gap(mean, printed)
+    difference = difference_of_intervals(mean, printed)
     near = difference.low > -NEAR
     if difference.high < 0:
         if near:
@@ -43,18 +43,6 @@ def reached(mean: Interval, printed: Interval) -> str:
     if near:
         return verdict.HOLDS
     return verdict.INCONCLUSIVE
-
-
-def gap(mean: Interval, printed: Interval) -> Interval:
-    """How much higher a mean is than a printed number, which may have its own interval.
-
-    The interval of the difference is computed from the two intervals (R. G. Newcombe, Statistics in
-    Medicine 17 (1998) 873-890, method 10).
-    """
-    difference = mean.mean - printed.mean
-    below = hypot(mean.mean - mean.low, printed.high - printed.mean)
-    beyond = hypot(mean.high - mean.mean, printed.mean - printed.low)
-    return Interval(difference, difference - below, difference + beyond)
 
 
 def gained(difference: Interval, printed: Interval) -> str:

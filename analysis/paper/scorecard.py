@@ -18,9 +18,12 @@ from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import difference_of_intervals
+from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import INCONCLUSIVE, position_of
 from dess.base.files.reading import parse_toml, read_text
-from dess.policies.learner.config import TrainingConfig
+from dess.policies.learner.config import TrainingConfig, read_description
+from dess.policies.registry import TRAINED
 from dess.policies.shipped import NULLS
 
 TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
@@ -70,6 +73,8 @@ class Claim(NamedTuple):
         printed: The paper's number, if it prints one.
         basis: What is measured, in words, if the text does not say so.
         weakness: Whether the claim is that something is lost, so that no policy passes it.
+        printed_metric: The metric whose printed mean the number is, if it is over a known number of
+            missions; ``values.printed_intervals`` has its interval.
     """
 
     page: str
@@ -82,6 +87,14 @@ class Claim(NamedTuple):
     printed: measures.Quantity | None = None
     basis: str = ""
     weakness: bool = False
+    printed_metric: str = ""
+
+    def with_interval(self, means: Mapping[str, Mapping[str, Interval]]) -> Self:
+        """The claim with the interval of its printed mean, by study and metric, if it has one."""
+        if self.printed is None or not self.printed_metric or self.study not in means:
+            return self
+        interval = means[self.study][self.printed_metric]
+        return self._replace(printed=self.printed._replace(interval=interval))
 
 
 def _read_claim(
@@ -95,26 +108,27 @@ def _read_claim(
     """A claim of a section of the file."""
     measured = partial(getattr(measures, measure), **arguments or {})
     number = None
+    metric = ""
     if printed:
         number = _printed_quantity(**printed)
+        if number.n:
+            metric = printed["figure"].rpartition(".")[2]
     place = {name: section[name] for name in ("page", "study")}
-    return Claim(rule=RULES[rule], measure=measured, printed=number, **place, **others)
+    known = {"measure": measured, "printed": number, "printed_metric": metric}
+    return Claim(rule=RULES[rule], **known, **place, **others)
 
 
 def _printed_quantity(
     figure: str,
     less: str = "",
     missions: str = "",
-    is_share: bool = False,
     unit: measures.Unit = "share",
     name: str = "",
 ) -> measures.Quantity:
-    """A number of the paper, with an interval if it is a share of a known number of missions."""
+    """A number of the paper, and the number of missions that it is a mean of, if that is known."""
     n = 0
     if missions:
         n = _printed_number(missions)
-    if is_share:
-        return measures.Quantity(values.interval_of_share(_printed_number(figure), n), n)
     return measures.Quantity.exact(
         _printed_number(figure) - (_printed_number(less) if less else 0), n, unit, name
     )
@@ -147,11 +161,13 @@ VARIANTS = ("quick", "no transfer")
 
 # The kinds of claims, by what is known of the policies that have learned nothing.
 DIAGNOSTIC, PASSED, OPEN, WEAKNESS = "diagnostic", "passed without learning", "open", "weakness"
+UNTESTED = "untested"
 KINDS = {
     DIAGNOSTIC: "The diagnostic claims: every policy without learning is shown to fail them",
     PASSED: "Claims that a policy passes that has learned nothing",
     OPEN: "Claims that no policy without learning passes, nor is each shown to fail them",
     WEAKNESS: "Weaknesses that the paper names: a policy has them too, or does not have them",
+    UNTESTED: "Claims that nothing here tests",
 }
 
 
@@ -170,6 +186,8 @@ class Row:
         A claim is diagnostic if every policy that has learned nothing, and to which it applies, is
         shown to fail it. A policy that is inconclusive is not.
         """
+        if all(finding.outcome == measures.NOT_APPLICABLE for finding in self.findings):
+            return UNTESTED
         if self.claim.weakness:
             return WEAKNESS
         nulls = [
@@ -206,17 +224,24 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
         return _evidence_of_policy(studies, smaller_study if is_own else study, column)
 
     from_studies = {"margin": indifference_margin(studies)}
+    means = {
+        name: values.printed_intervals(studies[name], name)
+        for name in values.PRINTED
+        if name in studies
+    }
+
+    def find(claim: Claim, column: str) -> measures.Finding:
+        finding = _find_for_claim(claim, from_studies, partial(evidence, claim.study, column))
+        return _limit_short_training(column, finding)
+
     words = {"margin": numbers.format_margin(from_studies["margin"]), **_NAMED}
     return [
         Row(
             claim,
             f"{claim.basis} {claim.rule.words.format(**words)}".strip(),
-            tuple(
-                _find_for_claim(claim, from_studies, partial(evidence, claim.study, c))
-                for c in COLUMNS
-            ),
+            tuple(find(claim, column) for column in COLUMNS),
         )
-        for claim in CLAIMS
+        for claim in (claim.with_interval(means) for claim in CLAIMS)
     ]
 
 
@@ -228,9 +253,31 @@ def indifference_margin(studies: Mapping[str, Results]) -> float:
     return (rule or {}).get("indifference") or MARGIN
 
 
+def _limit_short_training(column: str, finding: measures.Finding) -> measures.Finding:
+    """A finding on the paper's network, which a training that is too short leaves inconclusive.
+
+    It stands for the paper's learner, as trainings with and without transfer do. Other learners
+    stand for themselves.
+    """
+    if column != PAPERS_NETWORK or finding.verdict == measures.NO_RESULTS:
+        return finding
+    updates = _count_updates(read_description(TRAINED / PAPERS_NETWORK).training)
+    if updates >= values.CROSSING:
+        return finding
+    note = f"one training of {updates:,} updates{measures.TOO_SHORT}"
+    notes = [*filter(None, [finding.note]), note]
+    return replace(finding, verdict=INCONCLUSIVE, note="; ".join(notes))
+
+
+def _count_updates(training: TrainingConfig) -> int:
+    """The number of training steps of a training."""
+    return training.ticks * training.updates
+
+
 def departures_in_words(training: TrainingConfig) -> list[str]:
     """In what a training departs from the paper, in words."""
     n_step, num_envs = training.n_step, training.num_envs
+    updates = _count_updates(training)
     greedy = all(phase.temperature == 0 for phase in training.phases)
     differs = {
         "the return guard, which masks actions that would be too late to return": training.guard,
@@ -241,6 +288,8 @@ def departures_in_words(training: TrainingConfig) -> list[str]:
         "epsilon-greedy exploration without softmax": greedy,
         f"{num_envs:,} missions side by side": num_envs > 1,
         "a slow copy of the weights, which is the one evaluated": training.average_rate < 1,
+        f"its length, {updates:,} updates where the curves of the paper's two trainings cross at "
+        f"{values.CROSSING:,}": updates < values.CROSSING,
     }
     return [words for words, applies in differs.items() if applies]
 
@@ -308,7 +357,7 @@ def _find_for_claim(
     first, *others = finding.quantities
     if not printed or first.unit != printed.unit or first.unit not in ("share", "points"):
         return finding
-    beyond = rules.gap(first.interval, printed.interval)
+    beyond = difference_of_intervals(first.interval, printed.interval)
     shown = first, measures.Quantity(beyond, 0, "points", "minus the paper's"), *others
     return replace(finding, quantities=shown, against=position_of(beyond))
 
@@ -323,7 +372,7 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
 
     A weakness that the policy shares with the paper's is no claim that it passes.
     """
-    telling, passed, undecided, weaknesses = (of_kind(rows, kind) for kind in KINDS)
+    telling, passed, undecided, weaknesses, untested = (of_kind(rows, kind) for kind in KINDS)
     policy = policy_names(rows)[0]
     holding = sum(row.findings[0].passes for row in telling)
     short = [f"“{row.claim.text}”" for row in telling if row.findings[0].fails]
@@ -332,18 +381,20 @@ def scorecard_sentence(rows: Sequence[Row]) -> str:
     )
     shared = sum(row.findings[0].outcome == measures.SHARED for row in weaknesses)
     sentences = [
-        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {numbers.join_words(NULLS)}, as "
-        f"far as they were simulated, are shown to fail them. {policy} passes {holding} of these "
-        f"{len(telling)}."
+        f"Of {len(telling)} claims of the paper that tell learning from "
+        f"chance, {policy} passes {holding}: {numbers.join_words(NULLS)}, as far as they were "
+        "simulated, are shown to fail them."
     ]
     if short:
         sentences.append(f"It falls short of {numbers.join_words(short)}.")
     sentences.append(
-        f"Of the others, it passes {without} of {len(passed)} that a policy without learning "
-        f"passes too, and {undecided_held} of {len(undecided)} on which such policies decide "
-        f"nothing; it is shown to have {shared} of {len(weaknesses)} weaknesses that the paper "
-        "names."
+        f"Of the other {len(rows) - len(telling)}, it passes {without} of {len(passed)} that a "
+        f"policy without learning passes too, and {undecided_held} of {len(undecided)} on which "
+        f"such policies decide nothing; it is shown to have {shared} of {len(weaknesses)} "
+        "weaknesses that the paper names."
     )
+    if untested:
+        sentences.append(f"Nothing here tests {len(untested)}.")
     return " ".join(sentences)
 
 
@@ -378,10 +429,15 @@ def against_paper(rows: Iterable[Row]) -> pd.DataFrame:
         where it has one, and ``n``.
     """
     table = [
-        (row.claim.text, finding.policy, *rules.gap(first.interval, printed.interval), first.n)
+        (
+            row.claim.text,
+            finding.policy,
+            *finding.quantities[1].interval,
+            finding.quantities[0].n,
+        )
         for row in rows
-        if (printed := row.claim.printed) and printed.unit == "share"
+        if row.claim.printed and row.claim.printed.unit == "share"
         for finding in row.findings[:3]
-        if finding.against and (first := finding.quantities[0])
+        if finding.against
     ]
     return pd.DataFrame(table, columns=["claim", "policy", "mean", "low", "high", "n"])

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from math import hypot
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -14,6 +15,9 @@ from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, metric_in_miss
 from dess.analysis.stats import intervals
 
 Treatment = Literal["policy", "point"]
+
+# Of a comparison: with what is added for rare failures, and of Student's t without it.
+P_VALUES = ("p", "p_student")
 
 _MISSION = ("policy", "point", "seed", "replication")  # what identifies a mission
 
@@ -126,18 +130,24 @@ def adjust_p_values(p: np.ndarray, correction: Correction | None) -> np.ndarray:
 
 
 def add_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
-    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows."""
-    adjusted = adjust_p_values(table["p"].to_numpy(float), correction)
-    table.insert(table.columns.get_loc("p") + 1, "p_adjusted", adjusted)
+    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows.
+
+    If there is a ``p_student``, so is ``p_student_adjusted`` after it.
+    """
+    for name in P_VALUES:
+        if name in table:
+            adjusted = adjust_p_values(table[name].to_numpy(float), correction)
+            table.insert(table.columns.get_loc(name) + 1, f"{name}_adjusted", adjusted)
     return table
 
 
 def for_choice(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
     """Correct a table of comparisons whose baseline, or pair, was chosen by the same data.
 
-    By Bonferroni, ``p_adjusted`` is multiplied by the number of candidates.
+    By Bonferroni, adjusted p-values are multiplied by the number of candidates.
     """
-    return table.assign(p_adjusted=(table["p_adjusted"] * candidates).clip(upper=1))
+    names = [f"{name}_adjusted" for name in P_VALUES]
+    return table.assign(**{name: (table[name] * candidates).clip(upper=1) for name in names})
 
 
 _ROUNDING = 64 * np.finfo(float).eps  # relative tolerance below which differences count as equal
@@ -169,7 +179,7 @@ def t_test(differences: np.ndarray, level: float) -> tuple[intervals.Interval, f
 def difference_test(
     a: np.ndarray, b: np.ndarray, metric: str | Metric, level: float
 ) -> tuple[intervals.Interval, float]:
-    """The mean difference A - B of pairs, the interval that suits the metric, and the p-value.
+    """The mean difference A - B of pairs, the interval that suits the metric, and its p-value.
 
     Args:
         a: (n,) values of A.
@@ -213,8 +223,8 @@ def column_tests(
         levels: The confidence level, or (K,) levels.
 
     Returns:
-        (K, 6): ``difference`` (column - baseline) with ``low``, ``high``, ``n``, ``student`` (as in
-        ``Paired``) and ``p``.
+        (K, 7): ``difference`` (column - baseline) with ``low``, ``high``, ``n``, ``student`` (as in
+        ``Paired``), ``p`` and ``p_student``.
     """
     differences = values.sub(baseline, axis=0)
     size = values.abs().max().clip(lower=baseline.abs().max())
@@ -229,13 +239,14 @@ def column_tests(
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
     means = values.where(present).mean()
     rare = intervals.rare_differences(measure, means, means - mean)
+    t = (mean / differences.sem()).abs()
+    table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
+    for column in differences.columns[constant & (n > 0)]:
+        table.loc[column, "p"] = sign_test(differences[column].dropna().to_numpy())
+        if n[column] > 1:
+            table.loc[column, ["low", "high"]] = mean[column]
+    table["p_student"] = table["p"]
     if rare is None:
-        t = (mean / differences.sem()).abs()
-        table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
-        for column in differences.columns[constant & (n > 0)]:
-            table.loc[column, "p"] = sign_test(differences[column].dropna().to_numpy())
-            if n[column] > 1:
-                table.loc[column, ["low", "high"]] = mean[column]
         return table
     size = n + 2
     centre = (n * mean + rare[0] + rare[1]) / size
@@ -255,6 +266,7 @@ def column_tests(
         losses = (differences < 0).sum()
         exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
         table.loc[exact, "p"] = [*map(mcnemar_p_value, gains[exact], losses[exact])]
+        table.loc[exact, "p_student"] = table["p"]
     return table
 
 
@@ -277,7 +289,8 @@ class Paired(NamedTuple):
     ``variance_reduction`` is v = 1 - Var(A - B) / (Var A + Var B). Without common random numbers,
     1 / (1 - v) times as many missions would be needed. If v is negative, pairing made the interval
     wider. ``student`` is half the length of Student's interval of these differences, without what
-    is added for rare failures; nan for a single pair.
+    is added for rare failures; nan for a single pair. ``p_student`` is its p-value; of outcomes,
+    whose exact test adds nothing, it is ``p``.
     """
 
     difference: float
@@ -288,6 +301,7 @@ class Paired(NamedTuple):
     variance_reduction: float
     n: int
     student: float = np.nan
+    p_student: float = np.nan
 
 
 def compare_pairs(
@@ -321,9 +335,11 @@ def compare_pairs(
     reduction = 0.0
     if of_a + of_b:
         reduction = 1 - of_differences / (of_a + of_b)
-    plain = intervals.mean_interval(differences, level)
+    plain, p_student = t_test(differences, level)
     half = (plain.high - plain.low) / 2
-    return Paired(*mean, p, correlation, reduction, a.size, half)
+    if metric_of(metric).is_outcome:
+        p_student = p
+    return Paired(*mean, p, correlation, reduction, a.size, half, p_student)
 
 
 def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Paired:
@@ -344,6 +360,19 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     n = min(len(a), len(b))
     difference = float(np.mean(a) - np.mean(b))
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
+
+
+def difference_of_intervals(
+    mean: intervals.Interval, other: intervals.Interval
+) -> intervals.Interval:
+    """How much higher a mean is than another one, from their two intervals.
+
+    Source: R. G. Newcombe, Statistics in Medicine 17 (1998) 873-890, method 10.
+    """
+    difference = mean.mean - other.mean
+    below = hypot(mean.mean - mean.low, other.high - other.mean)
+    beyond = hypot(mean.high - mean.mean, other.mean - other.low)
+    return intervals.Interval(difference, difference - below, difference + beyond)
 
 
 def relative_change(

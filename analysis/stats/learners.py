@@ -40,7 +40,8 @@ class Crossed(NamedTuple):
 
     ``low`` and ``high`` bound the expected difference of the learner's trainings, ``new_low`` and
     ``new_high`` that of one new training. The standard deviations are those of the trainings, of
-    the missions, and of the rest.
+    the missions, and of the rest. ``p_student`` is the p-value without what is added for rare
+    failures.
     """
 
     difference: float
@@ -49,6 +50,7 @@ class Crossed(NamedTuple):
     new_low: float
     new_high: float
     p: float
+    p_student: float
     training_sd: float
     mission_sd: float
     rest_sd: float
@@ -84,9 +86,10 @@ def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
         spread = np.nan
         if missions > 1:
             spread = float(d.std(ddof=1))
-        return Crossed(*of_missions, np.nan, np.nan, p, np.nan, spread, np.nan)
+        return Crossed(*of_missions, np.nan, np.nan, p, p, np.nan, spread, np.nan)
     if np.ptp(d) == 0:
-        return Crossed(*of_missions, mean, mean, sign_test(d[:, 0]), 0.0, 0.0, 0.0)
+        both = 2 * [sign_test(d[:, 0])]
+        return Crossed(*of_missions, mean, mean, *both, 0.0, 0.0, 0.0)
     row = d.mean(axis=1, keepdims=True)
     column = d.mean(axis=0, keepdims=True)
     rest = float(np.sum((d - row - column + mean) ** 2)) / (trainings - 1) / (missions - 1)
@@ -103,7 +106,8 @@ def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     if sems.any():
         p = max(p, _alpha_of(lambda alpha: half(sems, alpha), abs(mean)))
     deviations = np.sqrt([max(between - rest / missions, 0.0), shared, rest])
-    return Crossed(mean, mean - ends, mean + ends, mean - new, mean + new, p, *deviations.tolist())
+    around = mean - ends, mean + ends, mean - new, mean + new
+    return Crossed(mean, *around, p, p, *deviations.tolist())
 
 
 def compare_learners(
@@ -183,6 +187,8 @@ def _compare_learner(
     result = compare_crossed(differences, level)
     if len(a) == 1:
         mean, p = difference_test(a[0], b, metric, level)
+        if metric.is_outcome:
+            result = result._replace(p_student=p)
         return result._replace(low=mean.low, high=mean.high, p=p), differences
     rare = rare_differences(metric, a.mean(), b.mean())
     if rare is None or (b.size == 1 and not metric.is_bounded):

@@ -2,8 +2,9 @@
 
 An interval for a fixed number of missions covers too seldom if its reader watches it grow narrower
 and stops when it pleases. A confidence sequence covers the mean at all numbers of missions at once
-with probability 1 - error, so it may be watched. It is about half as wide again as an interval for
-a fixed number.
+with probability 1 - error, so it may be watched. For 100 to 600 missions it is 1.3 to 1.8 times as
+wide as the interval of a mean for a fixed number, and 2.4 to 3.2 times as that of a paired
+difference.
 
 Values with known bounds have the betting sequence of Waudby-Smith and Ramdas (Estimating means of
 bounded random variables by betting, JRSS B 86, 2024). It bets against every possible mean of a

@@ -5,9 +5,17 @@ An estimate is ``ABOVE`` or ``BELOW`` a reference if its whole interval is, else
     >>> position_of(Interval(0.2, 0.1, 0.3))
     'above'
 
+The intervals of differences allow for failures that are too rare to be in the missions. Where they
+contain 0 only because of this allowance, the difference lies on one side *in what was seen*:
+
+    >>> position_with_allowance(ABOVE, without=ABOVE), position_with_allowance(INCONCLUSIVE, ABOVE)
+    ('above', 'above in what was seen')
+
 A part of a claim is shown (True), refuted (False) or open (None), by a complete interval. Of
 several alternatives, some may be the best, and some are on the front of two metrics.
 """
+
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +24,15 @@ from scipy.special import stdtrit
 from dess.analysis.metrics import Metric, metric_of
 from dess.analysis.stats.intervals import LEVEL, Interval, level_after, rare_differences
 
-ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
-MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
+ABOVE, INCONCLUSIVE, BELOW = "above", "inconclusive", "below"
+SEEN_ABOVE, SEEN_BELOW = "above in what was seen", "below in what was seen"
+# In tables.
+MARKS = {ABOVE: "▲", SEEN_ABOVE: "△", INCONCLUSIVE: "≈", SEEN_BELOW: "▽", BELOW: "▼"}
+# What is to be said of a difference that is shown in what was seen, and no further.
+NOT_RULED_OUT = "a rare failure is not ruled out"
+# How an alternative compares with all others by a metric.
+BEST, SEEN_BEST, TIED = "best", "best in what was seen", "tied"
+SEEN_WORSE, WORSE, ONLY = "worse in what was seen", "worse", "only"
 HOLDS, IN_PART, REFUTED = "holds", "holds in part", "does not hold"
 
 Part = bool | None
@@ -38,6 +53,55 @@ def position_of(interval: Interval, reference: float = 0.0) -> str:
     if interval.high < reference:
         return BELOW
     return INCONCLUSIVE
+
+
+def position_with_allowance(whole: str, without: str) -> str:
+    """The verdict on a difference, from its position with the allowance for failures and without.
+
+    Args:
+        whole: The position by the complete interval, or by its p-value.
+        without: The position by Student's interval, or by its p-value.
+
+    Returns:
+        ``whole``, or where that is ``INCONCLUSIVE`` the side in what was seen, if there is one.
+    """
+    sides = {ABOVE: SEEN_ABOVE, BELOW: SEEN_BELOW}
+    if whole == INCONCLUSIVE:
+        return sides.get(without, INCONCLUSIVE)
+    return whole
+
+
+def judge_difference(row: Any) -> str:
+    """The verdict on a paired difference by its intervals with the allowance and without.
+
+    An interval without a length tells nothing about the variance, so the test has to show the
+    difference as well.
+
+    Args:
+        row: A row of ``dess.analysis.compare``: ``difference``, ``low``, ``high``, ``p``,
+            ``student`` and ``p_student``.
+
+    Returns:
+        One of the keys of ``MARKS``.
+    """
+    whole = INCONCLUSIVE
+    if row.low < row.high or row.p <= 1 - LEVEL:
+        whole = position_of(row)
+    return position_with_allowance(whole, position_by_test(row.difference, row.p_student))
+
+
+def judge_by_tests(rows: pd.DataFrame) -> list[str]:
+    """The verdicts on paired differences by their adjusted p-values.
+
+    Args:
+        rows: Rows of ``dess.analysis.compare``, or of ``compare_learners``.
+
+    Returns:
+        For each row one of the keys of ``MARKS``.
+    """
+    whole = map(position_by_test, rows["difference"], rows["p_adjusted"])
+    without = map(position_by_test, rows["difference"], rows["p_student_adjusted"])
+    return [*map(position_with_allowance, whole, without)]
 
 
 def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
@@ -175,8 +239,62 @@ _BLOCK = 512  # settings that are compared with all others at once, which limits
 _ROUNDING = 1e-12  # variances and differences below this, relative to the values, count as 0
 
 
+def judge_alternatives(
+    values: np.ndarray,
+    low: pd.Series,
+    high: pd.Series,
+    metric: Metric,
+    looks: np.ndarray,
+    left: np.ndarray | None = None,
+) -> np.ndarray:
+    """How each of several alternatives compares with all others, on common replications.
+
+    With probability ``LEVEL``, the truly best is among those that are not ``WORSE``. Those of them
+    that Student's t alone rules out are worse in what was seen: a rare failure is not ruled out.
+
+    Args:
+        values: (R, K) values of K alternatives, as ``may_be_best`` takes them.
+        low: (K,) lower ends of the intervals of their means.
+        high: (K,) upper ends.
+        metric: The metric.
+        looks: (K,) how often a search could have ended the missions of each.
+        left: (K,) those that a selection has not ruled out; the others are ``WORSE``. By default
+            all.
+
+    Returns:
+        (K,) of ``BEST``, ``SEEN_BEST``, ``TIED``, ``SEEN_WORSE``, ``WORSE``; ``ONLY`` if there is
+        no other one.
+    """
+    if values.shape[1] == 1:
+        return np.array([ONLY], object)
+    if left is not None and not left.all():
+        verdicts = np.full(values.shape[1], WORSE, object)
+        those = values[:, left], low[left], high[left], metric, looks[left]
+        verdicts[left] = judge_alternatives(*those)
+        verdicts[verdicts == ONLY] = BEST
+        return verdicts
+    may_be = may_be_best(values, metric, looks) & within_reach(low, high, metric).to_numpy()
+    leads = may_be & may_be_best(values, metric, looks, allowance=False)
+    if not leads.any():
+        leads = may_be
+    first = TIED
+    if may_be.sum() == 1:
+        first = BEST
+    elif leads.sum() == 1:
+        first = SEEN_BEST
+    return np.select([leads, may_be], [first, SEEN_WORSE], WORSE).astype(object)
+
+
+def may_lead(verdicts: np.ndarray) -> np.ndarray:
+    """Which of the verdicts of ``judge_alternatives`` are on what may be the best, as was seen."""
+    return ~np.isin(verdicts.astype(str), (SEEN_WORSE, WORSE))
+
+
 def may_be_best(
-    values: np.ndarray, metric: str | Metric = "", looks: np.ndarray | None = None
+    values: np.ndarray,
+    metric: str | Metric = "",
+    looks: np.ndarray | None = None,
+    allowance: bool = True,
 ) -> np.ndarray:
     """The settings that no other setting is significantly better than.
 
@@ -195,6 +313,8 @@ def may_be_best(
             added, as in ``dess.analysis.compare``.
         looks: (K,) how often a search could have ended the missions of each setting; by default
             their number is fixed.
+        allowance: Whether the rare differences are added. Without them, the settings are those that
+            may be the best by what was seen, and the probability above is lower.
 
     Returns:
         (K,) of bool. A setting that has fewer than two replications in common with every other one
@@ -213,7 +333,9 @@ def may_be_best(
         looks = np.zeros(values.shape[1], int)
     error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1)
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
-    rare = [_rare_leads(measure, means, means[block, None]) for block in blocks]
+    rare: list[Any] = [None] * len(blocks)
+    if allowance:
+        rare = [_rare_leads(measure, means, means[block, None]) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - error_of_policy) for of_pairs in shared]

@@ -1,6 +1,6 @@
 """Tables of the results of a study in the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -10,6 +10,7 @@ from dess.analysis.answers import diff, optimality, summary
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import setting_cells
 from dess.analysis.answers.settings.points import points_in_words, setting_in_words
+from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.answers.settings.sobol import index_table
 from dess.analysis.metrics import (
     EITHER,
@@ -23,6 +24,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import MARKS, NOT_RULED_OUT, SEEN_BELOW, SEEN_WORSE, WORSE
 from dess.analysis.tables import comparison_cells, format_counts
 from dess.analysis.tables import means_table as means_table
 from dess.reports.cli import console
@@ -53,7 +55,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
             if is_search:
                 pairs = means[["policy", "point"]].itertuples(index=False)
                 means = means.assign(policy=[setting_in_words(results, *pair) for pair in pairs])
-            _print_means(means, f"{checks} further missions", printed)
+            selected_by = [*selected["metric"].unique()] if "metric" in selected else []
+            _print_means(means, f"{checks} further missions", printed, selected_by)
     elif len(results.store.manifest.points) == 1:
         _print_means(summary.means_of_points(results), "mean, 95 % interval", printed)
     elif short:
@@ -71,12 +74,13 @@ def print_details(
     Args:
         results: The study.
         frames: The tables.
-        everything: Whether the means of all metrics are printed, not of the product alone.
+        everything: Whether the means of all metrics are printed, not of the product and of what
+            the study selects by.
     """
     measured = measured_in({*frames["means"]["metric"]})
-    metrics = [PRODUCT]
+    metrics = [*dict.fromkeys([ranking_metric(results), PRODUCT])]
     if everything:
-        metrics = [*METRICS, *measured]
+        metrics = [*dict.fromkeys([*metrics, *METRICS, *measured])]
     printers = {
         "sensitivities": lambda table: _print_titled(
             "shares of the collection ratio's variance:",
@@ -123,6 +127,9 @@ def _print_selections(selected: pd.DataFrame) -> None:
         columns = ["condition", *columns]
     cells = selected.set_index("policy")[columns]
     cells["missions"] = format_counts(cells["missions"])
+    if "metric" in selected:
+        measure = metric_of(selected["metric"].iloc[0])
+        cells[measure.head] = summary.selected_by_cells(selected)
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         console.print_text(f" {guarantee}")
@@ -148,13 +155,23 @@ def _print_precisions(results: Results, table: pd.DataFrame) -> None:
     _print_titled("precision:", cells)
 
 
-def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
-    """A row per policy, and one with the values that the paper prints; a column per metric."""
+def _print_means(
+    means: pd.DataFrame, title: str, printed: Mapping[str, float], also: Iterable[str] = ()
+) -> None:
+    """A row per policy, and one with the values that the paper prints; a column per metric.
+
+    Args:
+        means: Rows of ``dess.analysis.summary``.
+        title: What they are means of.
+        printed: The values of the paper; may be empty.
+        also: Metrics that are printed beside the paper's and what extended scenarios measure.
+    """
     cells = means_table(means).cells.drop(columns="Missions").set_index("Policy")
     if printed:
         cells.loc["paper"] = [numbers.format_percent(printed[metric]) for metric in METRICS]
     print_frame(title, cells)
-    measured = means[means["metric"].isin(EITHER)]
+    others = {*EITHER, *also}.difference(METRICS)
+    measured = means[means["metric"].isin(others)]
     if not measured.empty:
         cells = numbers.estimates_as_text(
             measured, "metric", "policy", numbers.format_quantities
@@ -181,14 +198,18 @@ def _print_by_point(results: Results, means: pd.DataFrame, metrics: list[str]) -
         if "best" in cells:
             console.print_text(
                 " best: significantly better than the others on common replications (95 %, at "
-                "each design point by itself); ≈: these may all be the best"
+                "each design point by itself); ≈: these may all be the best; "
+                f"{MARKS[SEEN_BELOW]}: worse in what was seen, where {NOT_RULED_OUT}"
             )
 
 
 def _best_policies(rows: pd.DataFrame) -> pd.Series:
     """The policy that is the best at each design point, or those that may be, the first first."""
-    may_be = rows[rows["verdict"] != summary.WORSE].sort_values("mean", ascending=False)
-    return may_be.groupby("point")["policy"].agg(" ≈ ".join)
+    may_be = rows[rows["verdict"] != WORSE].sort_values("mean", ascending=False)
+    is_behind = may_be["verdict"] == SEEN_WORSE
+    leading = may_be[~is_behind].groupby("point")["policy"].agg(" ≈ ".join)
+    behind = may_be[is_behind].groupby("point")["policy"].agg(f" {MARKS[SEEN_BELOW]} ".join)
+    return leading.str.cat(f" {MARKS[SEEN_BELOW]} " + behind, join="left", na_rep="")
 
 
 def _target_in_words(metric: Metric, end: float) -> str:

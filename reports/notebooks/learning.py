@@ -56,6 +56,10 @@ html.make_figure(
 
 # %% [markdown]
 # What a method adds depends on the methods that are there before it.
+#
+# <a id="reward"></a>The paper says that its small reward for charging and its large one for a
+# filled quota balance collecting and charging. "None of the three" has these rewards, and none of
+# our methods.
 
 # %%
 html.write_markdown("{text}", text=answers.without_each(last))

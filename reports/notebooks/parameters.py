@@ -46,6 +46,7 @@ changes = main_effects.compare_values_by_field(fig5, effects)
 ratios = main_effects.compare_values_by_field(fig5, effects, metrics.RATIO)
 level = numbers.format_level(LEVEL)
 checks = summary.means_of_check(sweet)
+paper = values.printed_intervals(sweet, "sweet-spot")
 
 # %%
 html.make_answer(main_effects.strongest_fields_sentence(effects, policies, changes))
@@ -101,10 +102,10 @@ html.write_markdown(
 html.make_gallery(
     [
         (
-            plot_performance(checks, metric, values.SWEET_SPOT[metric]),
+            plot_performance(checks, metric, paper[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
             f"n = {numbers.format_span(checks['n'])} missions; bars are {level} intervals. Dashed: "
-            "the paper.",
+            "the paper's number, with the interval that its missions and our spread give.",
         )
         for metric, name in metrics.METRICS.items()
         if len(checks)

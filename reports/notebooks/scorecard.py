@@ -12,7 +12,7 @@
 # %% [markdown]
 # # Which claims of the paper hold?
 #
-# Every claim of the paper's Section V, judged by rules from simulations here.
+# Every claim of the paper's Sections III-C and V, judged by rules from simulations here.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results of table4, fig4, fig5, sweet-spot
@@ -27,7 +27,7 @@ from IPython.display import display
 from dess.analysis import load_results, numbers
 from dess.analysis.answers.learning import read_curves
 from dess.analysis.figures.comparison import plot_claims
-from dess.analysis.paper import scorecard
+from dess.analysis.paper import scorecard, values
 from dess.analysis.results.chunks import MANIFEST
 from dess.base.files.reading import paths_in
 from dess.policies.learner.config import read_description
@@ -77,8 +77,13 @@ table(scorecard.DIAGNOSTIC)
 #
 # Every interval has its level alone, so some verdicts are wrong by chance. The best learned policy
 # is chosen on the missions that judge it. Every number of UAVs that a study draws has the same
-# weight in a mean, however often the missions drew it. The paper prints no intervals; where it does
-# not say over how many missions a number is a mean, the number counts as exact.
+# weight in a mean, however often the missions drew it. The paper prints no intervals. Its means
+# over a known number of missions have one here, by our spread of the collection ratio; where it
+# does not say over how many missions a number is a mean, the number counts as exact. Claims on the
+# paper's learner need trainings as long as its own: shorter ones leave them inconclusive.
+
+# %%
+html.write_markdown("{snr}", snr=values.SNR_IN_WORDS)
 
 # %%
 html.make_table(scorecard.count_verdicts(rows), "Verdicts by policy")
@@ -87,7 +92,7 @@ html.make_table(scorecard.count_verdicts(rows), "Verdicts by policy")
 # ## Tables
 
 # %%
-for kind in (scorecard.PASSED, scorecard.OPEN, scorecard.WEAKNESS):
+for kind in (scorecard.PASSED, scorecard.OPEN, scorecard.WEAKNESS, scorecard.UNTESTED):
     table(kind)
 
 # %% [markdown]

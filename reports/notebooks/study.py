@@ -140,9 +140,10 @@ html.show_parts(no_check if study.checks.empty else fleet_tables.check_table(stu
 # ## The best settings
 #
 # A *setting* is a policy at a design point. It *may be the best* if no other one is significantly
-# better: with a probability of 95 %, the truly best is among these (paired t tests, corrected for
-# the number of settings and, after a search, of its looks). So a setting of few missions may be the
-# best although its mean is much lower.
+# better in what was seen. With a probability of 95 %, the truly best is among these and those that
+# are only *not in what was seen*, where a rare failure is not ruled out (paired t tests on common
+# replications, corrected for the number of settings and, after a search, of its looks). So a
+# setting of few missions may be the best although its mean is much lower.
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
@@ -190,7 +191,7 @@ html.show_parts(
     summary.selection_table(study),
     html.write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
     tables.means_table(
-        summary.means_of_check(study), tables.CHECKED, metrics=with_way_home(study, METRICS)
+        summary.means_of_check(study), tables.CHECKED, with_way_home(study, metrics)
     ),
 )
 

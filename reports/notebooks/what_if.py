@@ -29,7 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 # %%
 from IPython.display import display
 
-from dess.analysis import metrics, what_if
+from dess.analysis import metrics, tables, what_if
 from dess.analysis.answers import summary
 from dess.analysis.answers.variation import measured_columns
 from dess.analysis.metrics import metric_of
@@ -49,9 +49,7 @@ html.make_answer(variation.sentence())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-html.lead_figure(
-    variation.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals."
-)
+html.lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
 
 # %%
 sides = found.scenario(0), found.scenario(1)
@@ -118,7 +116,10 @@ html.make_table(
 
 # %%
 for policy in found.policies:
-    marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
+    marks = (
+        "▲ higher in the variation, ▼ lower, △ and ▽ the same in what was seen, where a rare "
+        "failure is not ruled out, ≈ inconclusive"
+    )
     display(html.make_table(variation.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]

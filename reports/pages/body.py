@@ -36,6 +36,8 @@ TERMS = {
     "is Wilson's; of other shares it holds for all distributions between 0 and 1, so it is wider; "
     "of other means it is Student's t, corrected for skewness. Intervals of differences allow for "
     "failures that are too rare to be seen",
+    "Peak age of information": "the mean of the ages just before a node is emptied. A node that no "
+    "UAV empties has no peak, but counts in the mean age, so the mean may lie above the peak",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")

@@ -57,6 +57,7 @@ DIGITS = "%.6g"  # format of numbers in files with data
 # Characters that LaTeX cannot print directly.
 _IN_LATEX = str.maketrans(
     {"−": "$-$", "–": "--", "▲": r"$\triangle$", "▼": r"$\nabla$", "≈": r"$\approx$", "±": r"$\pm$"}
+    | {"△": r"($\triangle$)", "▽": r"($\nabla$)"}
 )
 # What may harm in Markdown (HTML, links, formulas), and all that Markdown may take as markup,
 # partly at the beginning of a line only.

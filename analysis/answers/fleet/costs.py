@@ -62,7 +62,7 @@ def priced_settings(results: Results) -> pd.DataFrame:
         InputError: If the study has no prices.
     """
     words = fleets_in_words(results)
-    table = rank_settings(results, COST).drop(columns=["rank", "tied"])
+    table = rank_settings(results, COST).drop(columns=["rank", "standing", "tied"])
     of_points = conditions_in_words(results)
     table.insert(0, "condition", [of_points[point] for point in table["point"]])
     table.insert(1, "fleet", [words[point] for point in table["point"]])

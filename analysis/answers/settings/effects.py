@@ -11,6 +11,7 @@ from pandas.api.types import is_numeric_dtype
 
 from dess.analysis.answers.settings.points import (
     ordered_values,
+    points_left,
     values_of_points,
 )
 from dess.analysis.metrics import (
@@ -29,7 +30,7 @@ from dess.analysis.stats.intervals import (
     level_after,
     stratified_interval,
 )
-from dess.analysis.stats.verdict import may_be_best
+from dess.analysis.stats.verdict import judge_alternatives, may_lead
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -56,8 +57,9 @@ def average_over_others(
     Returns:
         A row per policy and combination, in the order of the study: ``policy``, the fields,
         ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` (number of points that
-        the mean is taken over), and ``tied``: whether the combination may be the best of this
-        policy.
+        the mean is taken over), ``standing``: how the combination compares with the others of this
+        policy (``stats.verdict.judge_alternatives``), and ``tied``: whether it may be the best by
+        what was seen.
 
     Raises:
         InputError: If there is no such field, metric or policy.
@@ -137,8 +139,14 @@ def _average_labelled(
             at_points = by_replication(part, metric, "point")
             at_points = at_points.reindex(columns=range(len(cell_of)))
             ends = _intervals_over_points(at_points, cell_of, measure, level_after(seen))
+        left = np.ones(len(cells), bool)
+        if (sizes == 1).all():  # a cell is a design point
+            left[cell_of] = points_left(results, str(name))
+        verdicts = judge_alternatives(
+            wide.to_numpy(float), ends["low"], ends["high"], measure, seen, left
+        )
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, tied=may_be_best(wide.to_numpy(float), measure, seen))
+        table = table.assign(points=sizes, standing=verdicts, tied=may_lead(verdicts))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -188,4 +196,6 @@ def effect_table(results: Results, metric: str) -> Table:
         rows.append((field_named(str(field)).name, policy, *both, span))
     heads = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
     caption = f"The effect of each field on {measure.within}, averaged over the others"
-    return Table(pd.DataFrame(rows, columns=heads), caption, effects.drop(columns="tied"))
+    return Table(
+        pd.DataFrame(rows, columns=heads), caption, effects.drop(columns=["standing", "tied"])
+    )

@@ -27,6 +27,7 @@ from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import PRODUCT, Metric, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import NOT_RULED_OUT, SEEN_WORSE, WORSE
 from dess.analysis.tables import INTERVALS
 
 MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
@@ -44,9 +45,10 @@ _MEANT = {
 
 
 _FRAMED = (
-    "The star marks the cell with the best mean of this policy. Orange frames: cells that are not "
-    "significantly worse than any other, so each may be the best."
+    "The star marks the best cell of this policy. Orange frames: cells that may be the best by "
+    "what was seen."
 )
+_DOTTED = f" Dotted frames: cells that are worse in what was seen, where {NOT_RULED_OUT}."
 
 
 def draw_curves(
@@ -122,8 +124,8 @@ def draw_heat_map(
 ) -> Drawing:
     """A metric of a policy over two fields: the best cell, and those that may be as good.
 
-    A star marks the best cell; framed cells are not significantly worse, see
-    ``average_over_others``.
+    A star marks the best cell; cells in full frames may be as good by what was seen, those in
+    dotted frames only if a rare failure was not, see ``average_over_others``.
 
     Args:
         results: The study.
@@ -153,10 +155,11 @@ def draw_heat_map(
         column=rows[x].map(values[x].index),
         text=[_format_cell(mean, measure) if has_room else "" for mean in rows["mean"]],
     )
+    leading = rows[rows["tied"]]
     if measure.less_is_better:
-        best = rows["mean"].idxmin()
+        best = leading["mean"].idxmin()
     else:
-        best = rows["mean"].idxmax()
+        best = leading["mean"].idxmax()
     scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
     if measure.less_is_better:
         scale["cmap"] = "YlGnBu_r"
@@ -168,9 +171,12 @@ def draw_heat_map(
             else:
                 part = rows[rows[facet] == value]
             mesh = style.plot_cells(part, (values[y], values[x]), ax, **scale)
-            for row in part[part["tied"]].itertuples():
-                corner = row.column + 0.06, row.row + 0.06
-                ax.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK))
+            for standing, framed in part[part["standing"] != WORSE].groupby("standing"):
+                line = ":" if standing == SEEN_WORSE else "-"
+                for row in framed.itertuples():
+                    corner = row.column + 0.06, row.row + 0.06
+                    frame = {"fill": False, "edgecolor": MARK, "linestyle": line}
+                    ax.add_patch(Rectangle(corner, 0.88, 0.88, **frame))
             if best in part.index:
                 place = rows.loc[best, "column"] + 0.5, rows.loc[best, "row"] + 0.8
                 ax.plot(*place, "*", color=MARK, markersize=9, markeredgecolor="white")
@@ -193,8 +199,11 @@ def draw_heat_map(
     fields = fields_by_influence(main_effects(results, metric))
     if others := [field for field in fields if field not in named]:
         caption += f"Cells are averaged over {_fields_in_words(others)}. "
+    caption += _FRAMED
+    if (rows["standing"] == SEEN_WORSE).any():
+        caption += _DOTTED
     alt = f"{measure.name} of {policy} over {_fields_in_words(named)}"
-    return Drawing(figure, alt, caption + _FRAMED, data)
+    return Drawing(figure, alt, caption, data)
 
 
 def draw_heat_maps(results: Results, metrics: Iterable[str]) -> Iterator[Drawing]:
@@ -238,7 +247,7 @@ def draw_main_effects(
         f"bars are {INTERVALS}."
     )
     alt = f"{measure.name} against each field, averaged over the others"
-    return Drawing(drawing, alt, caption, effects.drop(columns="tied"))
+    return Drawing(drawing, alt, caption, effects.drop(columns=["standing", "tied"]))
 
 
 def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Drawing:

@@ -8,6 +8,7 @@ which the fleet has to work.
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
@@ -52,6 +53,19 @@ def values_of_points(results: Results) -> pd.DataFrame:
         if len({*texts}) > 1:
             columns[field] = texts
     return pd.DataFrame(columns, index=range(len(manifest.points)))
+
+
+def points_left(results: Results, policy: str) -> np.ndarray:
+    """Which design points the selection of a study has not ruled out for a policy.
+
+    Returns:
+        (points,) of bool; all True if the study selects no best design point.
+    """
+    left = np.ones(len(results.store.manifest.points), bool)
+    if (choice := results.choice(policy)) is not None:
+        left[:] = False
+        left[[choice.best, *choice.survivors]] = True
+    return left
 
 
 def points_in_words(results: Results) -> list[str]:

@@ -21,6 +21,7 @@ from dess.analysis.answers.settings.points import (
     metrics_of_page,
     named_cells,
     points_in_words,
+    points_left,
     setting_in_words,
     values_of_points,
     varied_values,
@@ -45,7 +46,15 @@ from dess.analysis.stats.intervals import (
     level_after,
     mean_interval,
 )
-from dess.analysis.stats.verdict import may_be_best, within_reach
+from dess.analysis.stats.verdict import (
+    MARKS,
+    NOT_RULED_OUT,
+    SEEN_BELOW,
+    SEEN_WORSE,
+    WORSE,
+    judge_alternatives,
+    may_lead,
+)
 from dess.analysis.tables import (
     MOST_PRINTED,
     MOST_ROWS,
@@ -105,41 +114,57 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
     """
     measure = metric_of(metric)
     best = table.iloc[0]
-    others = len(table) - 1
-    tied = table[table["tied"]]
     value = measure.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
-    names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
+    name = setting_in_words(results, best["policy"], best["point"])
+    what = "policy"
     if varied_values(results):
         what = "setting"
-    else:
-        what = "policy"
-    many = len(names) - 1
-    named = ""
-    if many <= MOST_NAMES:
-        named = f" ({'; '.join(names[1:])})"
-    if not others:
-        rest = ""
-    elif others == 1 and many:
-        rest = f"The other {what} may be as good."
-    elif others == 1:
-        rest = f"The other {what} is significantly worse."
-    elif not many:
-        rest = f"All {others:,} others are significantly worse."
-    elif many == others:
-        rest = f"All {others:,} others may be as good{named}."
-    else:
-        rest = (
-            f"Of the {others:,} others, {many:,} may be as good{named}; the rest are "
-            "significantly worse."
-        )
     parts = [
-        f"The best {what} is {names[0]}: {measure.within} {value}, n = {best['n']:,}.",
-        rest,
+        f"The best {what} is {name}: {measure.within} {value}, n = {best['n']:,}.",
+        _others_in_words(results, table.iloc[1:], what),
         ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
         way_home_sentence_of(results, best, metric),
         unequal_lengths_sentence(results, [measure]),
     ]
     return " ".join(filter(None, parts))
+
+
+def _others_in_words(results: Results, others: pd.DataFrame, what: str) -> str:
+    """How all settings but the best compare with it, in a sentence; empty if there are none.
+
+    Args:
+        results: The study.
+        others: The rows of ``rank_settings`` but the first.
+        what: What each is called: a setting, or a policy.
+    """
+    tied = others[others["tied"]]
+    worse = "significantly worse"
+    if any(results.choice(policy) for policy in results.policies):
+        worse = "ruled out by the selection"
+        if len(results.policies) > 1:
+            worse += " or significantly worse"
+    as_good = "may be as good"
+    if 0 < len(tied) <= MOST_NAMES and len(others) > 1:
+        names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
+        as_good += f" ({'; '.join(names)})"
+    verb = "is" if len(others) == 1 else "are"
+    seen = int((others["standing"] == SEEN_WORSE).sum())
+    counts = {
+        as_good: len(tied),
+        f"{verb} worse in what was seen, where {NOT_RULED_OUT}": seen,
+        f"{verb} {worse}": int((others["standing"] == WORSE).sum()),
+    }
+    found = {words: count for words, count in counts.items() if count}
+    if not found:
+        return ""
+    if len(others) == 1:
+        return f"The other {what} {next(iter(found))}."
+    if len(found) == 1:
+        return f"All {len(others):,} others {next(iter(found))}."
+    *first, last = [f"{count:,} {words}" for words, count in found.items()]
+    if counts[f"{verb} {worse}"]:
+        last = f"the rest are {worse}"
+    return f"Of the {len(others):,} others, {'; '.join([*first, last])}."
 
 
 def unequal_lengths_sentence(results: Results, metrics: Iterable[Metric]) -> str:
@@ -202,8 +227,11 @@ def rank_settings(
     Returns:
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
-        ``dess.analysis.summary``, which allow for a search), ``n`` missions, and ``tied``: whether
-        the setting may be the best, by ``may_be_best`` and ``within_reach`` over all rows. Of equal
+        ``dess.analysis.summary``, which allow for a search), ``n`` missions, ``standing``: how the
+        setting compares with the others (``stats.verdict.judge_alternatives``), and ``tied``:
+        whether it may be the best by what was seen. Where a study selects, its selected settings
+        come first, and those that it has ruled out are worse. Settings of different numbers of
+        missions are ranked by their differences from the first on common replications. Of equal
         settings, the first in the study has the lower rank.
 
     Raises:
@@ -224,12 +252,49 @@ def rank_settings(
         ends = column_intervals(wide, measure, level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was the last one.
-    table["tied"] = may_be_best(wide.to_numpy(float), measure, seen)
-    table["tied"] &= within_reach(table[f"{metric}_low"], table[f"{metric}_high"], measure)
-    ascending = measure.less_is_better
-    table = table.sort_values(metric, ascending=ascending, kind="stable", ignore_index=True)
+    values = wide.to_numpy(float)
+    left = np.array([points_left(results, row.policy)[row.point] for row in table.itertuples()])
+    ends = table[f"{metric}_low"], table[f"{metric}_high"]
+    table["standing"] = judge_alternatives(values, *ends, measure, seen, left)
+    table["tied"] = may_lead(table["standing"].to_numpy())
+    table = table.iloc[_order_settings(results, table, values, measure)].reset_index(drop=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
     return table
+
+
+def _order_settings(
+    results: Results, table: pd.DataFrame, values: np.ndarray, metric: Metric
+) -> np.ndarray:
+    """The positions of settings, the best first, see ``rank_settings``.
+
+    Args:
+        results: The study.
+        table: The settings, with ``policy``, ``point``, ``n`` and ``tied``.
+        values: (R, K) their values, nan where a setting lacks a replication.
+        metric: The metric.
+    """
+    sign = -1.0
+    if metric.less_is_better:
+        sign = 1.0
+    leads = sign * table[metric.column].to_numpy(float)
+    chosen = {policy: results.choice(policy) for policy in results.policies}
+    is_selected = np.array(
+        [
+            (choice := chosen[row.policy]) is not None and choice.best == row.point
+            for row in table.itertuples()
+        ]
+    )
+    if table["n"].nunique() > 1:
+        # Means over other replications do not compare: the longest of the leading ones is the
+        # reference, and the others are as far from it as where both were flown.
+        candidates = is_selected if is_selected.any() else table["tied"].to_numpy()
+        longest = candidates & (table["n"] == table["n"][candidates].max()).to_numpy()
+        reference = np.flatnonzero(longest)[np.argmin(leads[longest])]
+        common = sign * (values - values[:, [reference]])
+        shared = np.isfinite(common).any(axis=0)
+        leads = leads - leads[reference]
+        leads[shared] = np.nanmean(common[:, shared], axis=0)
+    return np.lexsort((leads, ~is_selected))
 
 
 def missions_at_best(results: Results, table: pd.DataFrame) -> pd.DataFrame:
@@ -276,7 +341,9 @@ def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Ta
     top = rows.head(MOST_ROWS)
     cells = _ranking_cells(results, top, metric)
     cells.insert(0, "Rank", top["rank"])
-    cells.insert(1, "May be the best", top["tied"].map(numbers.format_truth))
+    may_be = top["tied"].map(numbers.format_truth)
+    may_be = np.where(top["standing"] == SEEN_WORSE, "not in what was seen", may_be)
+    cells.insert(1, "May be the best", may_be)
     caption = (
         f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
         f"means with {intervals_in_words(results)}"
@@ -293,7 +360,8 @@ def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
         metric: The metric.
     """
     top = rows.head(MOST_PRINTED)
-    cells = pd.DataFrame({"rank": top["rank"].astype(str), "": np.where(top["tied"], "≈", "")})
+    marks = np.select([top["tied"], top["standing"] == SEEN_WORSE], ["≈", MARKS[SEEN_BELOW]], "")
+    cells = pd.DataFrame({"rank": top["rank"].astype(str), "": marks})
     cells["policy"] = top["policy"]
     for field in varied_values(results):
         cells[field] = top[field].map(field_named(field).cell)
@@ -306,6 +374,8 @@ def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
     if len(rows) > MOST_PRINTED:
         settings += f", the first {MOST_PRINTED} are shown"
     legend = f"≈: the {metric_of(metric).within} may be as good as that of the first"
+    if (top["standing"] == SEEN_WORSE).any():
+        legend += f"; {MARKS[SEEN_BELOW]}: it is worse in what was seen, where {NOT_RULED_OUT}"
     return Table(cells, f"{settings}; {legend}", rows)
 
 
@@ -318,7 +388,7 @@ def best_of_policies_table(results: Results, metric: str) -> Table:
         f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in rankings
     ]
     caption = f"The best setting of every policy by {metric_of(metric).within}"
-    return Table(cells, caption, best.drop(columns=["rank", "tied"]))
+    return Table(cells, caption, best.drop(columns=["rank", "standing", "tied"]))
 
 
 def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:

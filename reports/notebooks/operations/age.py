@@ -38,7 +38,8 @@ html.lead_figure(*lead)
 # ## Why
 #
 # The age of a node grows until a UAV empties it. A node without new data cannot be emptied: its age
-# grows until data arrive and are collected.
+# grows until data arrive and are collected. Such a node has no peak, but counts in the mean age: so
+# the peak age may be lower than the mean.
 
 # %%
 html.make_gallery(others)

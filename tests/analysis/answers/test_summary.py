@@ -14,6 +14,7 @@ from dess.analysis.answers.settings.sobol import sobol_indices
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.differences import compare
+from dess.analysis.stats.verdict import BEST, ONLY, SEEN_BEST, SEEN_WORSE, TIED, WORSE
 from dess.analysis.study.design import Saltelli
 
 # Names only: nothing is simulated.
@@ -114,12 +115,12 @@ def test_policies_are_compared_on_common_replications():
     jitter = np.tile([0.19, 0.2], 15)
     results, means = stub(a=spread + jitter, b=spread, c=spread[::-1] - 0.3)
     verdicts = summary.add_verdicts(results, means)["verdict"].tolist()
-    assert verdicts == [summary.BEST, summary.WORSE, summary.WORSE]
+    assert verdicts == [BEST, WORSE, WORSE]
     results, means = stub(a=spread + 0.01, b=spread)
-    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [SEEN_BEST, SEEN_WORSE]
     results, means = stub(a=spread, b=spread[::-1])
-    assert summary.add_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
-    assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [TIED] * 2
+    assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [ONLY]
 
 
 def test_an_allowance_for_failures_is_said_with_both_intervals():
@@ -197,6 +198,35 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
     assert set(table["trainings"]) == {2}
     alone = results_of("greedy", "ddqn")
     assert set(summary.compare_learned_with_heuristic(alone)["about"]) == {"this checkpoint"}
+
+
+COPY = """
+from dess.policies.registry import load
+
+
+class CopyNet:
+    name = "copy_net"
+    weights = "of a network"
+
+    def __init__(self):
+        self.network = load("ddqn")
+
+    def act(self, view):
+        return self.network.act(view)
+"""
+
+
+def test_a_policy_of_a_user_with_weights_is_learned(tmp_path):
+    """It is no heuristic with which learned policies are compared."""
+    (tmp_path / "copied_network.py").write_text(COPY)
+    copy = f"{tmp_path}/copied_network.py:CopyNet"
+    study = load_study("table4", policies=["random", copy, "ddqn", "greedy"], missions=5)
+    results = run_study(study, tmp_path / "out")
+    assert trained_policies_by_learner(results) == {copy: [copy], "ddqn": ["ddqn"]}
+    learned, heuristics = summary.rank_learned_and_others(results)
+    assert {*learned} == {copy, "ddqn"} and heuristics[0] == "greedy"
+    table = summary.compare_learned_with_heuristic(results)
+    assert {*table["baseline"]} == {"greedy"} and {*table["learner"]} == {copy, "ddqn"}
 
 
 def test_what_is_said_of_the_guard_is_computed():

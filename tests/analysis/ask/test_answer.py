@@ -13,10 +13,17 @@ from dess.analysis import sweep
 from dess.analysis.answers import variation as found
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.variation import BASELINE, VARIATION
-from dess.analysis.metrics import PRODUCT
+from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import LEVEL
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    INCONCLUSIVE,
+    SEEN_ABOVE,
+    SEEN_BELOW,
+    judge_difference,
+)
 from tests.analysis.small import asked, write_scenario
 
 POLICIES = ["random", "greedy"]
@@ -75,10 +82,10 @@ def answer(tmp_path_factory):
     return asked(tmp_path_factory.mktemp("what-if"))
 
 
-def row(difference, low, high, p=0.01, n=100):
+def row(difference, low, high, p=0.01, n=100, p_student=1.0):
     """A row of an answer, without an allowance for rare failures."""
-    ends = {"difference": difference, "low": low, "high": high}
-    return pd.Series({**ends, "p": p, "n": n, "student": (high - low) / 2})
+    ends = {"difference": difference, "low": low, "high": high, "p": p, "p_student": p_student}
+    return pd.Series({**ends, "n": n, "student": (high - low) / 2})
 
 
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
@@ -134,7 +141,7 @@ def test_missions_without_a_quota_have_no_allowance_for_being_shorter(tmp_path):
     longer = asked(tmp_path, 6, **changes, settings={"max_slots": 75})
     other = longer.table().set_index("metric").loc["slots"]
     assert other[["difference", "low", "high"]].tolist() == [15, 15, 15]
-    assert found.verdict_on_change(other) == ABOVE
+    assert judge_difference(other) == ABOVE
 
 
 @pytest.mark.parametrize(
@@ -142,13 +149,15 @@ def test_missions_without_a_quota_have_no_allowance_for_being_shorter(tmp_path):
     [
         (row(-0.2, -0.3, -0.1), BELOW),
         (row(0.1, -0.1, 0.3), INCONCLUSIVE),
+        (row(0.1, -0.1, 0.3, p=0.2, p_student=0.001), SEEN_ABOVE),
+        (row(-0.1, -0.3, 0.1, p=0.2, p_student=0.001), SEEN_BELOW),
         # Two equal differences prove nothing.
         (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),
         (row(0.5, 0.5, 0.5, p=0.002, n=10), ABOVE),
     ],
 )
 def test_the_whole_interval_decides(answer, side):
-    assert found.verdict_on_change(answer) == side
+    assert judge_difference(answer) == side
 
 
 def test_so_many_missions_show_the_difference_that_was_seen():
@@ -173,6 +182,40 @@ def test_what_is_allowed_for_rare_failures_falls_with_the_number_of_missions():
     needed = int(found.missions_needed(pairs(40)))
     assert pairs(40).low < 0 < pairs(needed).low
     assert pairs(needed // 2).low < 0
+
+
+def test_a_gain_in_most_missions_is_better_in_what_was_seen(answer):
+    """Better in 234 of 300 pairs, and no failure: Student's t shows it, a rare failure may undo it.
+
+    The ratio and the collected data, of which it is a share, have the same verdict.
+    """
+    n = 300
+    before = np.linspace(0.7, 0.9, n)
+    gains = 0.004 * np.where(np.arange(n) % 50 < 39, 1.0, -1.0)
+    missions = answer.results.missions
+    (like,) = missions.head(1).to_dict("records")
+    rows = [
+        like | {"point": p, "replication": k, "collection_ratio": r, PRODUCT: r, SUCCESS: 1.0}
+        | {"initial": 300.0, "arrived": 0.0, "collected": 300.0 * r, "residual": 300.0 * (1 - r)}
+        for p, ratios in ((BASELINE, before), (VARIATION, before + gains))
+        for k, r in enumerate(ratios)
+    ]  # fmt: skip
+    one = answer.results.uavs.merge(missions.head(1)[["policy", "point", "replication"]])
+    uavs = [one.assign(point=row["point"], replication=row["replication"]) for row in rows]
+    made = replace(answer.results, missions=pd.DataFrame(rows), uavs=pd.concat(uavs))
+    assert (gains > 0).sum() == 234
+    table = found.compare_sides(made).set_index("metric")
+    verdicts = {m: judge_difference(table.loc[m]) for m in (PRODUCT, "collection_ratio")}
+    verdicts |= {m: judge_difference(table.loc[m]) for m in ("collected", "collected_per_uav")}
+    assert {*verdicts.values()} == {SEEN_ABOVE}
+    assert judge_difference(table.loc["residual"]) == SEEN_BELOW
+    variation = found.Variation(made, like["policy"])
+    assert "(higher in what was seen; a rare failure is not ruled out)" in variation.sentence()
+    (said,) = [found.conclusion_in_words(row) for row in variation._of_product()]
+    assert "product is **higher in what was seen** (a rare failure is not ruled out), by +0" in said
+    assert "show it with a probability of 80 %" in said
+    ratio = variation.measures(like["policy"]).set_index("Mean per mission")
+    assert ratio.loc["Collection ratio", "Paired difference"].startswith("△ ")
 
 
 def with_missions(answer, before, after, ratios):
@@ -216,10 +259,14 @@ def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
 def test_what_is_explained_occurs(answer, monkeypatch):
     """Intervals that overlap, marks that are used, and learned policies."""
     assert "learned policy" not in answer.variation.reading()
-    monkeypatch.setattr(found, "verdict_on_change", lambda _: ABOVE)
+    monkeypatch.setattr(found, "judge_difference", lambda _: ABOVE)
     assert "≈" not in answer.variation.reading()
-    monkeypatch.setattr(found, "verdict_on_change", lambda _: INCONCLUSIVE)
+    monkeypatch.setattr(found, "judge_difference", lambda _: INCONCLUSIVE)
     assert "≈" in answer.variation.reading() and "overlap" not in answer.variation.reading()
+    assert "△" not in answer.variation.reading()
+    monkeypatch.setattr(found, "judge_difference", lambda _: SEEN_BELOW)
+    assert "lower (▽) in what was seen" in answer.variation.reading()
+    assert "overlap" not in answer.variation.reading()
 
 
 def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):

@@ -10,6 +10,7 @@ from dess.analysis.answers.main_effects import LEVELS, PEAK, RISES, VALLEY, Shap
 from dess.analysis.paper import rules, values
 from dess.analysis.paper.measures import Pairs, negate_changes
 from dess.analysis.paper.scorecard import RULES
+from dess.analysis.stats.differences import difference_of_intervals
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from dess.analysis.study.selection import Choice
@@ -68,8 +69,12 @@ def test_a_rule_about_one_interval(rule, mean, half, verdict):
 def test_the_paper_s_figures_vary_as_well():
     """Newcombe's example: 56 of 70 against 48 of 80, 20 points [5.2, 33.4]."""
     ours, theirs = values.interval_of_share(56 / 70, 70), values.interval_of_share(48 / 80, 80)
-    assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
-    assert tuple(rules.gap(around(0.8, 0.02), around(0.7, 0))) == pytest.approx((0.1, 0.08, 0.12))
+    assert tuple(difference_of_intervals(ours, theirs)) == pytest.approx(
+        (0.2, 0.0524, 0.3339), abs=5e-5
+    )
+    assert tuple(difference_of_intervals(around(0.8, 0.02), around(0.7, 0))) == pytest.approx(
+        (0.1, 0.08, 0.12)
+    )
     below = around(0.89, 0.009)
     assert rules.reached(below, around(0.9, 0)) == IN_PART
     assert rules.reached(below, Interval(0.9, 0.88, 0.92)) == HOLDS

@@ -49,10 +49,10 @@ def test_negative_variance_components_are_zero():
 
 
 def test_equal_differences_of_trainings():
-    assert compare_crossed(np.zeros((3, 4))) == (0, 0, 0, 0, 0, 1, 0, 0, 0)
+    assert compare_crossed(np.zeros((3, 4))) == (0, 0, 0, 0, 0, 1, 1, 0, 0, 0)
     result = compare_crossed(np.full((3, 4), 0.1))
     assert result[:5] == pytest.approx((0.1,) * 5)
-    assert result[5:] == (2 / 8, 0, 0, 0)
+    assert result[5:] == (2 / 8, 2 / 8, 0, 0, 0)
 
 
 def test_one_training_or_one_mission_leaves_deviations_unknown():

@@ -1,11 +1,14 @@
 """Confidence sequences: what the bets rule out, and how often a reader who watches is misled."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dess.analysis.stats.intervals import mean_interval, share_interval
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.stats.differences import compare_pairs
+from dess.analysis.stats.intervals import bounded_interval, mean_interval, share_interval
 from dess.analysis.stats.sequences import PARTS, add_values, new_sequence, sequence_ends
 
 PORTION = 25
@@ -145,3 +148,24 @@ def test_readers_who_watch_a_time_are_seldom_misled(failing, most):
         return np.minimum(times, 30.0)
 
     assert share_of_misled(draw, 2.0 + 20.0 * failing, 2000, 0.0, most) <= 0.05
+
+
+def test_sequences_are_as_much_wider_than_a_studys_intervals_as_the_panel_says():
+    """For ratios of missions that differ little, with and without pairing."""
+    generator = np.random.default_rng(5)
+    templates = Path(__file__).parents[3] / "reports" / "templates"
+    caption = (templates / "panel.html").read_text("utf-8")
+    assert "1.3 to 1.8 times for means, 2.4 to 3.2 times for differences" in caption
+    for n in (100, 300, 600):
+        a = np.clip(0.8 + 0.13 * generator.normal(size=n), 0, 1)
+        b = np.clip(a - 0.04 + 0.05 * generator.normal(size=n), 0, 1)
+        pair = compare_pairs(b, a, metric=PRODUCT)
+        mean = bounded_interval(a)
+        widths = []
+        for ends, values in (((0.0, 1.0), a), ((-1.0, 1.0), b - a)):
+            sequence = new_sequence(*ends)
+            add_values(sequence, values)
+            low, high = sequence_ends(sequence)
+            widths.append(high - low)
+        assert 1.3 < widths[0] / (mean.high - mean.low) < 1.85
+        assert 2.35 < widths[1] / (pair.high - pair.low) < 3.25

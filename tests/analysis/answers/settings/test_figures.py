@@ -16,6 +16,7 @@ from dess.analysis.answers.settings.figures import (
     evenly_spaced,
 )
 from dess.analysis.metrics import SUCCESS
+from dess.analysis.stats.verdict import SEEN_WORSE
 from tests.analysis.small import grid
 
 
@@ -56,8 +57,10 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
     panels = [ax for ax in drawing.axes if ax.collections and ax.get_label() != "<colorbar>"]
     shown = np.concatenate([np.ravel(ax.collections[0].get_array()) for ax in panels])
     assert sorted(shown) == pytest.approx(sorted(table["mean"]))
-    frames = sum(isinstance(patch, Rectangle) for ax in panels for patch in ax.patches)
-    assert frames == table["tied"].sum() > 0
+    lines = [p.get_linestyle() for ax in panels for p in ax.patches if isinstance(p, Rectangle)]
+    assert lines.count("-") == table["tied"].sum() > 0
+    assert lines.count(":") == (table["standing"] == SEEN_WORSE).sum() > 0
+    assert "Dotted frames: cells that are worse in what was seen" in caption
     ((star, panel),) = [(line, ax) for ax in panels for line in ax.lines]
     means = panel.collections[0].get_array()
     best = means[int(star.get_ydata()[0]), int(star.get_xdata()[0])]

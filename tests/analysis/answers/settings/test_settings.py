@@ -22,7 +22,7 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.answers.settings.ranking import best_settings_sentence, rank_settings
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.analysis.stats.verdict import may_be_best
+from dess.analysis.stats.verdict import SEEN_BEST, SEEN_WORSE, TIED, WORSE, may_be_best
 from tests.analysis.small import grid
 
 
@@ -108,11 +108,38 @@ def test_a_setting_of_few_missions_is_not_tied_when_its_interval_is_below(result
 
 def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
     table = rank_settings(results)
-    said = best_settings_sentence(results, table.assign(tied=True), PRODUCT)
+    all_tied = table.assign(tied=True, standing=TIED)
+    said = best_settings_sentence(results, all_tied, PRODUCT)
     assert "All 11 others may be as good." in said and "worse" not in said
-    said = best_settings_sentence(results, table.assign(tied=table["rank"] <= 3), PRODUCT)
+    standing = np.where(table["rank"] <= 3, TIED, WORSE)
+    three = table.assign(tied=table["rank"] <= 3, standing=standing)
+    said = best_settings_sentence(results, three, PRODUCT)
     assert "Of the 11 others, 2 may be as good (" in said
     assert "the rest are significantly worse." in said
+    seen = three.assign(standing=three["standing"].where(three["rank"] != 4, SEEN_WORSE))
+    said = best_settings_sentence(results, seen, PRODUCT)
+    assert "1 are worse in what was seen, where a rare failure is not ruled out; the rest" in said
+    all_seen = table.assign(tied=table["rank"] == 1, standing=SEEN_WORSE)
+    said = best_settings_sentence(results, all_seen, PRODUCT)
+    assert "All 11 others are worse in what was seen, where a rare failure is not ruled" in said
+
+
+def test_cells_that_differ_by_many_standard_errors_are_not_said_to_be_as_good(results):
+    """21 standard errors apart, and no failure among the missions."""
+    missions = results.missions
+    few = missions[(missions["policy"] == "greedy") & (missions["replication"] < 12)]
+
+    def metric(policy, point, replication):
+        noise = 0.01 * np.sqrt(11) * np.resize([-1, 1], 12)[replication] * (point > 0)
+        return 0.8 - 0.21 * (point > 0) + noise
+
+    made = planted(replace(results, missions=few), metric)
+    table = rank_settings(made)
+    gaps = made.missions.pivot(index="replication", columns="point", values=PRODUCT)
+    gaps = gaps[0] - gaps[1]
+    assert gaps.mean() / gaps.sem() == pytest.approx(21)
+    assert table["tied"].tolist() == [True] + [False] * 5
+    assert table["standing"].tolist() == [SEEN_BEST] + [SEEN_WORSE] * 5
 
 
 def test_of_costs_the_lowest_is_the_best(results):

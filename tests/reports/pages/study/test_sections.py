@@ -25,7 +25,7 @@ STUDIES = {
     ),
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
-        ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
+        ["Orange frames: cells that may be the best by what was seen", "n = 10 missions per cell"],
         ["Comparison of the policies", "replications per cell"],
     ),
     "four fields": (
