@@ -23,7 +23,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare
+from dess.analysis.stats.differences import compare, insert_adjusted
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
     by_replication,
@@ -380,7 +380,7 @@ def correct_for_all_tests(results: Results, table: pd.DataFrame) -> pd.DataFrame
         results: The study.
         table: The comparisons, with ``p``.
     """
-    return table.assign(p_adjusted=(table["p"] * count_tests(results)).clip(upper=1))
+    return insert_adjusted(table, (table["p"] * count_tests(results)).clip(upper=1))
 
 
 def has_policies_to_compare(results: Results) -> bool:

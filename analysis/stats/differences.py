@@ -126,8 +126,22 @@ def adjust_p_values(p: np.ndarray, correction: Correction | None) -> np.ndarray:
 
 
 def add_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
-    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows."""
-    adjusted = adjust_p_values(table["p"].to_numpy(float), correction)
+    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows.
+
+    Rows without a p-value have none that is adjusted. Without a correction, the table is returned
+    as it is.
+    """
+    if correction is None:
+        return table
+    p = table["p"].to_numpy(float)
+    is_known = ~np.isnan(p)
+    adjusted = p.copy()
+    adjusted[is_known] = adjust_p_values(p[is_known], correction)
+    return insert_adjusted(table, adjusted)
+
+
+def insert_adjusted(table: pd.DataFrame, adjusted: Any) -> pd.DataFrame:
+    """Put ``p_adjusted`` behind ``p`` in a table of comparisons."""
     table.insert(table.columns.get_loc("p") + 1, "p_adjusted", adjusted)
     return table
 
@@ -395,7 +409,8 @@ def compare(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows: ``holm``, ``fdr`` or None.
+        correction: Correction of the p-values over all rows: ``holm`` or ``fdr``. With None, there
+            is no column ``p_adjusted``.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:

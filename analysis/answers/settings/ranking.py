@@ -32,6 +32,7 @@ from dess.analysis.metrics import (
     Metric,
     check_ranking_metric,
     format_length,
+    metric_in_groups,
     metric_in_missions,
     metric_of,
     metrics_in,
@@ -221,7 +222,8 @@ def rank_settings(
         measure = metric_in_missions(missions, name)
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
-        ends = column_intervals(wide, measure, level_after(seen))
+        of_cells = metric_in_groups(missions, name, cell, table)
+        ends = column_intervals(wide, of_cells, level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was the last one.
     table["tied"] = may_be_best(wide.to_numpy(float), measure, seen)
