@@ -42,6 +42,7 @@ class Metric:
             ``metric_in_missions`` finds it.
         failure: By how much a failure changes it, where the range is not known; 0 if that is not
             known either.
+        fails: Whether a failure may move it to an end of its range.
         grows: Whether it grows with the length of the mission, so that only missions of the same
             length are to be compared by it.
     """
@@ -58,6 +59,7 @@ class Metric:
     least: Any = -inf
     most: Any = inf
     failure: float = 0.0
+    fails: bool = True
     grows: bool = False
 
     @property
@@ -72,8 +74,10 @@ class Metric:
 
     @property
     def has_range(self) -> bool:
-        """Whether both ends of the range are known."""
-        return bool(np.isfinite(self.range[0]).all() and np.isfinite(self.range[1]).all())
+        """Whether both ends of the range are known, and a failure may lead there."""
+        return self.fails and bool(
+            np.isfinite(self.range[0]).all() and np.isfinite(self.range[1]).all()
+        )
 
     @property
     def is_wait(self) -> bool:
@@ -193,7 +197,7 @@ _OF_MISSIONS = (*_PAPER, Metric(REWARD, "Reward", failure=FAILURE_COST))
 _BESIDE = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
 # What only the missions of studies with bounds have, and those of studies with prices.
 _OF_BOUNDS = (
-    Metric(BOUND, "Upper bound", least=0.0, most=1.0),
+    Metric(BOUND, "Upper bound", least=0.0, most=1.0, fails=False),
     Metric(GAP, "Optimality gap", less_is_better=True, least=0.0, most=1.0),
 )
 _OF_PRICES = (Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),)

@@ -32,9 +32,9 @@ TERMS = {
     "replication": "the number of a mission, which fixes all its random draws",
     "paired": "taken in missions with the same random draws",
     "upper bound": "no policy can expect to collect more",
-    "95 % intervals": "Wilson's for success; that of a bounded mean for the other shares, which is "
-    "wider and not symmetric; Student's t with a correction for skewness for other means, and with "
-    "an allowance for rare failures for differences",
+    "95 % intervals": "Wilson's for success; Student's t with an allowance for rare failures for all "
+    "of which is known what a failure changes, which is wider and not symmetric; Student's t with a "
+    "correction for skewness for other means",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")

@@ -172,6 +172,14 @@ class FleetAnswer:
         return numbers.format_money(self.cost, self.results.prices.unit)
 
     @property
+    def _ends_of_cost_in_words(self) -> str:
+        """The interval of the mean cost, to follow it; empty if it is the same in all missions."""
+        selected = self.fleets[self.fleets["selected"]]
+        written = metric_of(COST).written(*selected[interval_columns(COST)].iloc[0])
+        _, space, ends = written.partition(" ")
+        return space + ends
+
+    @property
     def _where(self) -> str:
         """The policy and the condition, as the beginning of a sentence."""
         where = f"With the policy `{self.policy}`"
@@ -186,7 +194,7 @@ class FleetAnswer:
         parts = cost_parts_in_words(self.results, self.policy, self.points)
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {self.cost_in_words}{parts}."
+            f"for {self.cost_in_words}{self._ends_of_cost_in_words}{parts}."
         )
 
     def estimates_sentence(self) -> str:

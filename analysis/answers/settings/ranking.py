@@ -303,7 +303,8 @@ def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
         if measure.column != COST:
             cells[measure.head] = numbers.format_estimates(top, measure.column, measure.written)
     if prices := results.study.costs:
-        cells[COST] = [numbers.format_money(cost, prices.unit) for cost in top[COST]]
+        costs = numbers.format_estimates(top, COST, metric_of(COST).written)
+        cells[COST] = [f"{cost} {prices.unit}" for cost in costs]
     settings = f"{len(rows):,} settings"
     if len(rows) > MOST_PRINTED:
         settings += f", the first {MOST_PRINTED} are shown"
