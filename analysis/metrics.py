@@ -1,10 +1,11 @@
 """The metrics of missions: what they are called, measured in, and how they are written."""
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
@@ -26,21 +27,24 @@ class Metric:
         name: What pages call it.
         unit: The unit; empty for shares and counts.
         kind: An ``outcome`` is 0 or 1 in each mission, and its mean has Wilson's interval. The
-            values of a ``share`` lie between 0 and 1. The mean of a ``number`` and of a ``cost``
-            has Student's interval, corrected for the skewness of the missions.
+            values of a ``share`` lie between 0 and 1. How the interval of the mean of a ``number``
+            and of a ``cost`` is computed depends on what is known of rare missions
+            (``stats.intervals.ends_of_means``).
         less_is_better: Whether a lower value is better.
         in_percent: Whether it is written in percent, and its differences in percentage points.
         sheet_unit: The unit where there is a data sheet; empty if in the same.
         horizons: The largest value that a mission can have, as a share of the longest that it may
             last; 0 if it is not known.
-        least: The smallest value that a mission can have.
-        most: The largest value that a mission can have. Of a time, ``metric_in_missions`` finds it.
+        is_sum: Whether this is a time of each UAV, summed over all.
+        least: The smallest value that a mission can have. Of a cost, ``metric_in_missions`` finds
+            it.
+        most: The largest value that a mission can have. Of a time, a cost and an amount of data,
+            ``metric_in_missions`` finds it.
         failure: By how much a failure changes it, where the range is not known; 0 if that is not
-            known either. Of a cost, ``metric_in_missions`` finds it.
+            known either.
+        fails: Whether a failure may move it to an end of its range.
         grows: Whether it grows with the length of the mission, so that only missions of the same
             length are to be compared by it.
-        of_offered: Whether it is a part of the data that a mission has: a share of it is a share of
-            the collection ratio, and ``metric_in_missions`` finds its largest value.
     """
 
     column: str
@@ -51,29 +55,34 @@ class Metric:
     in_percent: bool = False
     sheet_unit: str = ""
     horizons: float = 0.0
-    least: float = -inf
-    most: float = inf
+    is_sum: bool = False
+    least: Any = -inf
+    most: Any = inf
     failure: float = 0.0
+    fails: bool = True
     grows: bool = False
-    of_offered: bool = False
 
     @property
-    def range(self) -> tuple[float, float]:
-        """The smallest and the largest value that a mission, and so a mean, can have."""
+    def range(self) -> tuple[Any, Any]:
+        """The smallest and the largest value that a mission, and so a mean, can have.
+
+        They are arrays where samples with ranges of their own are estimated together.
+        """
         if self.is_bounded:
             return (0.0, 1.0)
         return (self.least, self.most)
 
     @property
     def has_range(self) -> bool:
-        """Whether both ends of the range are known."""
-        return bool(isfinite(self.range[0]) and isfinite(self.range[1]))
+        """Whether both ends of the range are known, and a failure may lead there."""
+        return self.fails and bool(
+            np.isfinite(self.range[0]).all() and np.isfinite(self.range[1]).all()
+        )
 
-    def lasting(self, horizon: float) -> "Metric":
-        """The metric of missions that may last a time, in its unit; a time has a range then."""
-        if self.horizons:
-            return replace(self, most=self.horizons * horizon)
-        return self
+    @property
+    def is_wait(self) -> bool:
+        """Whether it is 0 in missions in which no UAV can wait for a pad."""
+        return self.column in in_either("waiting", "waiting_per_uav")
 
     @property
     def in_units(self) -> "Metric":
@@ -188,20 +197,27 @@ _OF_MISSIONS = (*_PAPER, Metric(REWARD, "Reward", failure=FAILURE_COST))
 _BESIDE = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
 # What only the missions of studies with bounds have, and those of studies with prices.
 _OF_BOUNDS = (
-    Metric(BOUND, "Upper bound", least=0.0, most=1.0),
-    Metric(GAP, "Optimality gap", less_is_better=True, least=-1.0, most=1.0),
+    Metric(BOUND, "Upper bound", least=0.0, most=1.0, fails=False),
+    Metric(GAP, "Optimality gap", less_is_better=True, least=0.0, most=1.0),
 )
 _OF_PRICES = (Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),)
 # The columns that results of earlier versions lack, the latest first.
 ADDED = (HOME,)
-# The columns of the longest that each mission may last, and of what a loss of its UAVs costs.
-MOST_SLOTS, MOST_LOST = "most_slots", "most_lost"
+# The columns of the longest that each mission may last, and that a UAV may wait for a pad in it.
+MOST_SLOTS, MOST_WAITING = "most_slots", "most_waiting"
+# The columns of the least and the most that each mission may cost.
+LEAST_COST, MOST_COST = "least_cost", "most_cost"
 
 
 def _time_metric(
-    column: str, name: str, sheet_unit: str = "h", horizons: float = 1.0, grows: bool = False
+    column: str,
+    name: str,
+    sheet_unit: str = "h",
+    horizons: float = 1.0,
+    grows: bool = False,
+    is_sum: bool = False,
 ) -> Metric:
-    """A time of which less is better; 0 ``horizons`` if it is a sum over UAVs."""
+    """A time of which less is better."""
     return Metric(
         column,
         name,
@@ -209,6 +225,7 @@ def _time_metric(
         less_is_better=True,
         sheet_unit=sheet_unit,
         horizons=horizons,
+        is_sum=is_sum,
         least=0.0,
         grows=grows,
     )
@@ -220,7 +237,6 @@ def _amount_metric(
     unit: str = "",
     sheet_unit: str = "",
     less: bool = False,
-    of_offered: bool = False,
 ) -> Metric:
     """A number that is not negative."""
     return Metric(
@@ -230,7 +246,6 @@ def _amount_metric(
         less_is_better=less,
         sheet_unit=sheet_unit,
         least=0.0,
-        of_offered=of_offered,
     )
 
 
@@ -251,17 +266,18 @@ _MEASURED = (
     _time_metric("waiting", "Waiting time for a pad", "min"),
     _amount_metric("pad_requests", "Requests for a pad"),
     Metric("utilisation", "Utilisation of the pads", kind="share"),
-    _amount_metric("failures", "Failures of UAVs", less=True),
-    _time_metric("slots_grounded", "Time under repair", horizons=0.0),
+    Metric("failures", "Failures of UAVs", less_is_better=True, least=0.0, failure=1.0),
+    _time_metric("slots_grounded", "Time under repair", is_sum=True),
 )
 # What records have in slots and data units; there is a metric of each in the units of a data sheet.
 _RECORDED = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
-    _time_metric("uav_slots", "UAV-hours", horizons=0.0),
-    _amount_metric(COLLECTED, "Data collected", _DATA, "MB", of_offered=True),
-    _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB", of_offered=True),
-    _amount_metric("residual", "Data left", _DATA, "MB", less=True, of_offered=True),
+    _time_metric(MOST_WAITING, "Longest that a UAV may wait for a pad"),
+    _time_metric("uav_slots", "UAV-hours", is_sum=True),
+    _amount_metric(COLLECTED, "Data collected", _DATA, "MB"),
+    _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
+    _amount_metric("residual", "Data left", _DATA, "MB", less=True),
     _time_metric("charging_per_uav", "Charging per UAV", "min"),
     _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
@@ -270,6 +286,13 @@ _IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in _ALL}
 _KNOWN = {metric.column: metric for metric in _ALL}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
 
+_PER_UAV = "collected_per_uav"
+# What a mission collects and leaves, by the metrics that are a part of both together.
+_DATA_KEPT = {column: (COLLECTED, "residual") for column in (COLLECTED, "residual", _PER_UAV)}
+_DATA_KEPT |= {
+    _IN_SHEET_UNIT[column]: tuple(_IN_SHEET_UNIT[part] for part in parts)
+    for column, parts in _DATA_KEPT.items()
+}
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
 # As they are measured, and in the units of data sheets.
@@ -293,56 +316,109 @@ def metric_of(column: str | Metric) -> Metric:
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
 
 
-def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
+def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 1) -> Metric:
     """The metric of a column of missions of at most this length, with its range.
 
     Args:
         column: The column.
-        slots: The longest that a mission may last.
+        slots: The longest that a mission, or what the metric measures in it, may last.
         units: What a slot is, of missions with a data sheet.
+        uavs: The most UAVs that a mission has.
     """
     metric = metric_of(column)
-    return metric.lasting(
-        slots * size_of(metric.unit, units) if units and metric.is_in_sheet_unit else slots
-    )
+    if not metric.horizons:
+        return metric
+    longest = metric.horizons * slots
+    if units and metric.is_in_sheet_unit:
+        longest *= size_of(metric.unit, units)
+    if metric.is_sum:
+        longest *= uavs
+    return replace(metric, most=longest)
 
 
 def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
     Args:
-        missions: The missions; the largest time is known if they have ``MOST_SLOTS``, what
-            failures cost if they have ``MOST_LOST``, and the most data if they have those of their
-            beginning and those that arrived, as the missions of results do.
+        missions: The missions, with the columns that ``ranges_of_missions`` needs, as the missions
+            of results have them.
         column: The column.
     """
     metric = metric_of(column)
-    if metric.kind == "cost" and MOST_LOST in missions:
-        return replace(metric, failure=float(missions[MOST_LOST].max()))
-    if metric.of_offered and {"initial", "arrived", COLLECTED} <= {*missions}:
-        return replace(metric, most=_most_data(missions, metric))
+    if not len(missions):
+        return metric
+    least, most = ranges_of_missions(missions, column)
+    return replace(metric, least=float(np.min(least)), most=float(np.max(most)))
+
+
+def metric_in_groups(
+    missions: pd.DataFrame, column: str, by: Sequence[str], groups: pd.DataFrame
+) -> Metric:
+    """The metric of a column of missions, with a range for each group of them.
+
+    Args:
+        missions: The missions, as in ``metric_in_missions``, and the columns ``by``.
+        column: The column.
+        by: The columns that tell the groups apart.
+        groups: A row per group, with these columns.
+
+    Returns:
+        The metric. The ends of its range are arrays in the order of the groups, or numbers if all
+        missions have the same.
+    """
+    metric = metric_in_missions(missions, column)
+    least, most = ranges_of_missions(missions, column)
+    if np.ndim(most) == 0 or np.ptp(least) == np.ptp(most) == 0:
+        return metric
+    ends = missions[[*by]].assign(least=least, most=most).groupby([*by])
+    place = pd.MultiIndex.from_frame(groups[[*by]])
+    lowest, highest = ends["least"].min(), ends["most"].max()
+    if len(by) == 1:
+        place = pd.Index(groups[by[0]])
+    return replace(
+        metric, least=lowest.reindex(place).to_numpy(), most=highest.reindex(place).to_numpy()
+    )
+
+
+def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
+    """The least and the largest value that each mission can have of a metric.
+
+    A time may be as long as the mission (``MOST_SLOTS``), a wait as long as somebody can wait
+    (``MOST_WAITING``), a cost has the range of ``LEAST_COST`` and ``MOST_COST``, and no more data
+    can be collected, or left, than both together.
+
+    Args:
+        missions: The missions. Of a column that they lack, nothing is known.
+        column: The column of the metric.
+
+    Returns:
+        (n,) arrays, or numbers that are those of all missions.
+    """
+    metric = metric_of(column)
+    if metric.kind == "cost" and MOST_COST in missions:
+        return np.asarray(missions[LEAST_COST]), np.asarray(missions[MOST_COST])
+    if column in _DATA_KEPT:
+        parts = _DATA_KEPT[column]
+        if all(part in missions for part in parts):
+            most = sum(np.asarray(missions[part]) for part in parts)
+            if column in (_PER_UAV, _IN_SHEET_UNIT[_PER_UAV]):
+                most = most / np.asarray(missions["uavs"])
+            return metric.range[0], most
+    if not metric.horizons:
+        return metric.range
     longest = metric_of(MOST_SLOTS)
+    if metric.is_wait and MOST_WAITING in missions:
+        longest = metric_of(MOST_WAITING)
     if metric.is_in_sheet_unit:
         longest = longest.in_units
-    if not metric.horizons or longest.column not in missions or not len(missions):
-        return metric
-    units = 1.0
+    if longest.column not in missions or (metric.is_sum and "uavs" not in missions):
+        return metric.range
+    most = metric.horizons * np.asarray(missions[longest.column], float)
     if metric.is_in_sheet_unit:
-        units = _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
-    return metric.lasting(float(missions[longest.column].max()) * units)
-
-
-def _most_data(missions: pd.DataFrame, metric: Metric) -> float:
-    """The most data that a mission has, in the unit of a metric; infinite if it is not known."""
-    offered = missions["initial"] + missions["arrived"]
-    if metric.column.startswith("collected_per_uav"):
-        offered = offered / missions["uavs"]
-    if metric.is_in_sheet_unit:
-        some = missions[missions[COLLECTED] > 0]
-        offered = offered * (some[_IN_SHEET_UNIT[COLLECTED]] / some[COLLECTED]).max()
-    if offered.notna().any():
-        return float(offered.max())
-    return inf
+        most *= _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
+    if metric.is_sum:
+        most *= np.asarray(missions["uavs"])
+    return metric.range[0], most
 
 
 def in_either(*columns: str) -> list[str]:
@@ -429,6 +505,15 @@ def ranking_column(metric: str, missions: Container[str]) -> str:
     column = column_in_sheet_unit(metric, missions)
     check_ranking_metric(column, missions)
     return column
+
+
+def longest_wait(space: ScenarioSpace) -> int:
+    """The most slots that a UAV may wait for a pad: none where each zone has pads for all UAVs."""
+    failures = space.failures
+    may_fail = failures.pad_rate > 0 or any(failures.pad_rates)
+    if may_fail or min(space.zone_pads) < space.uavs[1]:
+        return space.max_slots
+    return 0
 
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:

@@ -19,7 +19,7 @@ from dess.analysis.figures import Drawing
 from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import adjust_p_values
+from dess.analysis.stats.differences import add_adjusted
 from dess.analysis.stats.intervals import LEVEL, Interval, mean_interval
 from dess.analysis.stats.verdict import INCONCLUSIVE, MARKS, judge_parts, position_of, verdict_above
 from dess.base.errors import unknown_name
@@ -102,9 +102,7 @@ def compare_variants(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
         rows.append((variant, len(sample), mean, *ends, *gap, p))
     columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
-    table = pd.DataFrame(rows, columns=columns)
-    has_p = table["p"].notna()
-    table.loc[has_p, "p_adjusted"] = adjust_p_values(table.loc[has_p, "p"].to_numpy(), "holm")
+    table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
@@ -34,8 +35,8 @@ def by_fleet(results: Results) -> pd.DataFrame:
     Returns:
         A row per number of UAVs (or ``ALL``) and policy: ``uavs``, ``policy``, ``n`` missions, and
         for each of the columns ``collection_ratio_and_communication``, ``upper_bound`` and
-        ``optimality_gap`` its mean, with its 95 % interval in ``NAME_low`` and ``NAME_high``. Empty
-        if the study has no bounds.
+        ``optimality_gap`` its mean, with its 95 % interval in ``NAME_low`` and ``NAME_high``; that
+        of the product ends where that of the bound does. Empty if the study has no bounds.
     """
     if not results.bounds:
         return pd.DataFrame()
@@ -48,7 +49,9 @@ def by_fleet(results: Results) -> pd.DataFrame:
         names = {"mean": metric, "low": f"{metric}_low", "high": f"{metric}_high"}
         of_metric = rows[rows["metric"] == metric].rename(columns=names)
         table = table.merge(of_metric[[*keys, *names.values()]])
-    return table.assign(**{f"{BOUND}_high": table[f"{BOUND}_high"].clip(upper=1.0)})
+    # A mission may exceed its bound by chance, a mean cannot.
+    highest = np.maximum(table[f"{BOUND}_high"], table[PRODUCT])
+    return table.assign(**{f"{PRODUCT}_high": np.minimum(table[f"{PRODUCT}_high"], highest)})
 
 
 def fleet_bound_table(table: pd.DataFrame) -> pd.DataFrame:

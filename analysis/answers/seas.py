@@ -67,7 +67,7 @@ def means_over_seas(results: Results, by: str = ALL, metric: str = PRODUCT) -> p
         A row per group and policy: ``by``, ``policy``, ``metric``, ``mean``, ``low``, ``high`` and
         ``n`` seas.
     """
-    table = _of_groups(results, by, metric, column_intervals)
+    table = _of_groups(results, by, metric, lambda values: column_intervals(values, metric))
     return table.assign(metric=metric)[[by, "policy", "metric", *_ENDS, "n"]]
 
 

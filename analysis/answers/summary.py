@@ -24,7 +24,12 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import P_VALUES, compare, difference_of_intervals
+from dess.analysis.stats.differences import (
+    P_VALUES,
+    compare,
+    difference_of_intervals,
+    insert_adjusted,
+)
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.stats.intervals import (
     Interval,
@@ -384,8 +389,9 @@ def correct_for_all_tests(results: Results, table: pd.DataFrame) -> pd.DataFrame
         table: The comparisons, with ``p``.
     """
     count = count_tests(results)
-    corrected = {f"{name}_adjusted": (table[name] * count).clip(upper=1) for name in P_VALUES}
-    return table.assign(**corrected)
+    for name in P_VALUES:
+        table = insert_adjusted(table, (table[name] * count).clip(upper=1), name)
+    return table
 
 
 def has_policies_to_compare(results: Results) -> bool:

@@ -38,7 +38,7 @@ from dess.analysis.names import RANGES, described_field, field_in_words, field_n
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
-from dess.analysis.stats.differences import compare
+from dess.analysis.stats.differences import add_adjusted, compare
 from dess.analysis.stats.intervals import LEVEL, by_replication
 from dess.analysis.stats.verdict import (
     ABOVE,
@@ -125,9 +125,10 @@ def compare_sides(results: Results) -> pd.DataFrame:
     Returns:
         A row per policy and metric (those of ``METRICS``, the way home where missions may end in
         the air, what is ``measured_columns``, then those of ``MEASURES``): ``policy``, the means
-        ``before`` and ``after``, and the columns of ``dess.analysis.compare``. Every interval has
-        its own level of 95 %; see ``stats.differences.compare_pairs``. Of what only one side
-        measures, ``n`` is 0 and all else nan but the mean of this side.
+        ``before`` and ``after``, and the columns of ``dess.analysis.compare``, with ``p_adjusted``
+        (Holm) over the metrics of a policy. Every interval has its own level of 95 %; see
+        ``stats.differences.compare_pairs``. Of what only one side measures, ``n`` is 0 and all else
+        nan but the mean of this side.
     """
     missions = missions_of(results)
     of_paper = with_way_home(results, METRICS)
@@ -141,7 +142,7 @@ def compare_sides(results: Results) -> pd.DataFrame:
     fixed = [] if has_quota else [column_in_sheet_unit("slots", missions)]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
-        table = _compare_with_baseline(rows, metrics, fixed)
+        table = add_adjusted(_compare_with_baseline(rows, metrics, fixed), "holm")
         table = table.set_index("metric").reindex(metrics).rename_axis("metric").reset_index()
         table["n"] = table["n"].fillna(0).astype(int)
         sides = pd.DataFrame({m: by_replication(rows, m, "point").mean() for m in metrics})

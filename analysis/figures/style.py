@@ -44,6 +44,7 @@ LINES = ("-", "--", ":", "-.")
 MARKERS = "os^vPX*"
 TRAIL = 12  # number of last moves that are drawn behind a UAV
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
+READABLE = 4.5  # the least contrast of a text with its ground (WCAG 2.1, 1.4.3)
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
 # In all figures, blue means better, orange worse, and grey inconclusive.
 BETTER, WORSE = "#0173b2", "#c05000"
@@ -179,12 +180,17 @@ def readable_palette() -> list[str]:
 
 def _darken_until_readable(colour: tuple[float, ...]) -> tuple[float, ...]:
     """The colour, darkened until its contrast with white is 3 to 1 (WCAG 2.1, 1.4.11)."""
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
-    luminance = np.dot([0.2126, 0.7152, 0.0722], linear)
     darker = tuple(0.97 * c for c in colour)
-    if 1.05 / (luminance + 0.05) >= 3:
+    if _contrast_with_white(colour) >= 3:
         return colour
     return _darken_until_readable(darker)
+
+
+def _contrast_with_white(colour: Sequence[float]) -> float:
+    """The contrast of a colour with white, from 1 to 21 (WCAG 2.1, 1.4.3)."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour[:3]]
+    luminance = float(np.dot([0.2126, 0.7152, 0.0722], linear))
+    return 1.05 / (luminance + 0.05)
 
 
 def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
@@ -382,13 +388,17 @@ def plot_cells(rows: pd.DataFrame, names: Sequence[Sequence[Any]], ax: Axes, **c
     """
     means = np.full([len(values) for values in names], np.nan)
     means[rows["row"], rows["column"]] = rows["mean"]
+    cells = ax.pcolormesh(means, edgecolors="white", rasterized=means.size > 400, **colours)
     for row in rows.itertuples():
+        look = OUTLINED
+        if _contrast_with_white(cells.to_rgba(row.mean)) >= READABLE:
+            look = {"color": "white"}
         ax.annotate(row.text, (row.column + 0.5, row.row + 0.5), ha="center", va="center",
-                    fontsize=9, **OUTLINED)  # fmt: skip
+                    fontsize=9, **look)  # fmt: skip
     for axis, values in zip((ax.yaxis, ax.xaxis), names, strict=True):
         name_ticks(axis, values, np.arange(len(values)) + 0.5)
     ax.grid(visible=False)
-    return ax.pcolormesh(means, edgecolors="white", rasterized=means.size > 400, **colours)
+    return cells
 
 
 def plot_distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:

@@ -24,7 +24,15 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import MOST_LOST, MOST_SLOTS, columns_in_units
+from dess.analysis.metrics import (
+    COST,
+    LEAST_COST,
+    MOST_COST,
+    MOST_SLOTS,
+    MOST_WAITING,
+    columns_in_units,
+    longest_wait,
+)
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.manifest import (
     ELSEWHERE,
@@ -34,6 +42,7 @@ from dess.analysis.results.manifest import (
     Part,
     Selected,
 )
+from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import (
@@ -415,21 +424,25 @@ class Store:
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
-        ``most_slots`` is the longest that each may last. If the study has prices, the missions have
-        a ``cost``, and ``most_lost``, what a loss of all UAVs costs; with a data sheet, what they
-        measure is there in units as well (``metrics.columns_in_units``).
+        ``most_slots`` is the longest that each may last, and ``most_waiting`` the longest that a
+        UAV may wait in it. If the study has prices, the missions have a ``cost``, and the least and
+        the most that each may cost; with a data sheet, what they measure is there in units as well
+        (``metrics.columns_in_units``).
 
         Raises:
             InputError: If some are missing or damaged.
         """
         missions = self._rows("missions", parts)
-        longest = np.array([space.max_slots for space in self.manifest.scenarios])
-        missions[MOST_SLOTS] = longest[missions["point"].to_numpy()]
+        spaces = self.manifest.scenarios
+        points = missions["point"].to_numpy()
+        missions[MOST_SLOTS] = np.array([space.max_slots for space in spaces])[points]
+        missions[MOST_WAITING] = np.array([longest_wait(space) for space in spaces])[points]
         if costs := self.manifest.study.costs:
-            cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
-            missions["cost"] = sum(cost.values())
-            missions[MOST_LOST] = costs.of_lost(missions["uavs"].to_numpy())
-        if units := self.manifest.units_at(missions["point"].to_numpy()):
+            cost = costs.parts(spaces, missions, self.uavs(parts))
+            missions[COST] = sum(cost.values())
+            missions[LEAST_COST] = cost[PURCHASE]
+            missions[MOST_COST] = missions[LEAST_COST] + costs.most_running(spaces, missions)
+        if units := self.manifest.units_at(points):
             missions = missions.assign(**columns_in_units(missions, units))
         return missions
 

@@ -132,12 +132,24 @@ def adjust_p_values(p: np.ndarray, correction: Correction | None) -> np.ndarray:
 def add_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
     """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows.
 
-    If there is a ``p_student``, so is ``p_student_adjusted`` after it.
+    If there is a ``p_student``, so is ``p_student_adjusted`` after it. Rows without a p-value have
+    none that is adjusted. Without a correction, the table is returned as it is.
     """
+    if correction is None:
+        return table
     for name in P_VALUES:
         if name in table:
-            adjusted = adjust_p_values(table[name].to_numpy(float), correction)
-            table.insert(table.columns.get_loc(name) + 1, f"{name}_adjusted", adjusted)
+            p = table[name].to_numpy(float)
+            is_known = ~np.isnan(p)
+            adjusted = p.copy()
+            adjusted[is_known] = adjust_p_values(p[is_known], correction)
+            insert_adjusted(table, adjusted, name)
+    return table
+
+
+def insert_adjusted(table: pd.DataFrame, adjusted: Any, name: str = "p") -> pd.DataFrame:
+    """Put adjusted p-values behind their column in a table of comparisons."""
+    table.insert(table.columns.get_loc(name) + 1, f"{name}_adjusted", adjusted)
     return table
 
 
@@ -424,7 +436,8 @@ def compare(
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Correction of the p-values over all rows: ``holm``, ``fdr`` or None.
+        correction: Correction of the p-values over all rows: ``holm`` or ``fdr``. With None, there
+            is no column ``p_adjusted``.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:

@@ -8,7 +8,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import metric_of
+from dess.analysis.metrics import metric_in_missions
 from dess.analysis.stats import intervals
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
@@ -24,7 +24,7 @@ def distribution(
     by: Sequence[str] = ("policy",),
     quantiles: Sequence[float] = QUANTILES,
     tail: float = TAIL,
-    worst: Worst = "lowest",
+    worst: Worst | None = None,
     level: float = intervals.LEVEL,
     *,
     resamples: int = 9999,
@@ -34,7 +34,7 @@ def distribution(
     The mean of the worst missions is the conditional value at risk. Its BCa bootstrap interval is
     expanded for the size of the tail. It is reliable with about 30 missions or more in the tail
     (600 missions for the worst 5 %), and too narrow with fewer. Where all resamples agree, a metric
-    from 0 to 1 has the interval of a bounded mean of as many values as the tail has. The quantiles
+    of known range has the ``interval_of`` as many values as the tail has. The quantiles
     have the intervals of ``quantile_interval``; an end that no observation limits is nan.
 
     Args:
@@ -44,19 +44,26 @@ def distribution(
         by: Columns whose values form the groups; without any, all missions are one group.
         quantiles: Shares of the missions below each quantile, in (0, 1).
         tail: Share of the missions that are the worst, in (0, 1).
-        worst: Whether the ``lowest`` or the ``highest`` values are the worst.
+        worst: Whether the ``lowest`` or the ``highest`` values are the worst; by default the
+            highest of a metric of which less is better, such as an age, and otherwise the lowest.
         level: Confidence level.
         resamples: Number of bootstrap resamples.
 
     Returns:
         A row per group, in order of first appearance, and view: the columns ``by``, ``metric``,
         ``view`` (``quantile``, then ``worst mean``), ``share`` (of the missions below the quantile,
-        or in the tail), ``value``, ``low``, ``high`` and ``n``, the number of missions.
+        or in the tail), ``value``, ``low``, ``high`` and ``n``, the number of missions; those that
+        have not measured the metric are left out.
 
     Raises:
         InputError: If a column is missing, or an argument is not allowed.
     """
     intervals.check_columns(missions, [metric, *by])
+    measure = metric_in_missions(missions, metric)
+    if worst is None and measure.less_is_better:
+        worst = "highest"
+    elif worst is None:
+        worst = "lowest"
     if worst not in get_args(Worst):
         raise InputError("worst", repr(worst), ", ".join(get_args(Worst)))
     for name, share in [*(("quantiles", q) for q in quantiles), ("tail", tail), ("level", level)]:
@@ -68,17 +75,19 @@ def distribution(
 
     rows = []
     for group, part in intervals.group_rows(missions, by):
-        values = part[metric].to_numpy(float)
+        values = part[metric].dropna().to_numpy(float)
+        if not len(values):
+            continue
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
         expanded = intervals.expanded_level(level, tail * len(values))
         risk = intervals.bootstrap_interval(
             values, worst_mean, generator, expanded, resamples=resamples
         )
-        if metric_of(metric).is_bounded and risk.low == risk.high:
+        if measure.has_range and risk.low == risk.high:
             tail_values = np.full(max(int(tail * len(values)), 1), risk.mean)
-            risk = intervals.bounded_interval(tail_values, level)
+            risk = intervals.interval_of(measure, tail_values, level)
         views.append(("worst mean", tail, risk))
-        rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
+        rows += [(*group, metric, view, q, *ends, len(values)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
     return pd.DataFrame(rows, columns=columns).replace([-np.inf, np.inf], np.nan)
 

@@ -15,7 +15,7 @@ import scipy
 from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import Metric, metric_in_missions, metric_of, metrics_in
+from dess.analysis.metrics import PRODUCT, Metric, metric_in_missions, metric_of, metrics_in
 from dess.base.errors import unknown_name
 
 LEVEL = 0.95
@@ -36,30 +36,100 @@ def level_after(looks: Any, level: float = LEVEL) -> Any:
     return 1 - (1 - level) / np.maximum(looks * (looks + 1), 1)
 
 
-def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[Any, Any]:
-    """The ends of the confidence intervals of means of values from 0 to 1.
+def ends_of_means(
+    metric: Metric, mean: Any, variance: Any, skewness: Any, n: Any, level: Any = LEVEL
+) -> tuple[Any, Any]:
+    """The ends of the confidence intervals of means of a metric: here it is decided which it has.
 
-    At levels other than 95 %, not one 0 and one 1 are added but ``ndtri((1 + level) / 2)**2 / 4``
-    of each (0.96 at 95 %, 1.66 at 99 %): the more certain the interval, the rarer the values that
-    it must allow for.
+    Rare missions may lie far from all others: UAVs are lost, and a sample of some hundred missions
+    often has none of these. Where the values of such missions are known (``rare_values``), the
+    interval allows for them (``ends_with_rare``). All other metrics have the interval of
+    ``skewed_ends``. Both end where the range of the metric does.
+
+    A single mission of an unbounded metric has no interval. Outcomes of which all are 0 or 1 have
+    Wilson's interval instead (``share_interval``).
+
+    Args:
+        metric: The metric. The ends of its range may be arrays, with one for each sample.
+        mean: (...) means of the samples.
+        variance: (...) mean squared deviations of the samples from these means.
+        skewness: (...) skewness of the samples (``skewness_of``).
+        n: (...) numbers of values, above 0; not whole where it is an effective number.
+        level: Confidence level, or (...) levels.
+
+    Returns:
+        (...) lower and (...) upper ends.
+    """
+    rare = rare_values(metric, mean)
+    if rare is None:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.sqrt(variance / (n - 1))
+        low, high = skewed_ends(mean, error, skewness, n, level)
+    else:
+        low, high = ends_with_rare(mean, variance, n, rare, level)
+        if not metric.is_bounded:
+            low, high = (np.where(np.asarray(n) > 1, end, np.nan) for end in (low, high))
+    least, most = metric.range
+    return np.clip(low, least, most), np.clip(high, least, most)
+
+
+def rare_values(metric: Metric, mean: Any) -> tuple[Any, Any] | None:
+    """The lowest and the highest value that a rare mission may have of a metric.
+
+    They are the ends of its range or, where these are not known, what a failure makes of the mean.
+
+    Args:
+        metric: The metric; that of missions (``metric_in_missions``) has the range of a time, a
+            cost or an amount of data.
+        mean: (...) means of the metric.
+
+    Returns:
+        (...) the lowest and (...) the highest values; None if nothing is known of them.
+    """
+    if metric.has_range:
+        return metric.range
+    if metric.failure:
+        return np.maximum(mean - metric.failure, metric.range[0]), mean + metric.failure
+    return None
+
+
+def ends_with_rare(
+    mean: Any, variance: Any, n: Any, rare: tuple[Any, Any], level: Any = LEVEL
+) -> tuple[Any, Any]:
+    """The ends of Student's intervals of samples to which rare values are added.
+
+    Of each of the two rare values, ``ndtri((1 + level) / 2)**2 / 4`` are added: 0.96 at 95 %, 1.66
+    at 99 %. The more certain the interval, the rarer the values that it must allow for. For shares,
+    whose rare values are 0 and 1, A. Agresti and B. Caffo (The American Statistician 54 (2000)
+    280-288) add nearly the same, one of each.
 
     Args:
         mean: (...) means of the samples.
         variance: (...) mean squared deviations of the samples from these means.
         n: (...) numbers of values, above 0; not whole where it is an effective number.
+        rare: (...) the lowest and (...) the highest value that a rare mission may have.
         level: Confidence level, or (...) levels.
+
+    Returns:
+        (...) lower and (...) upper ends, with low <= mean <= high.
+    """
+    least, most = rare
+    added = ndtri((1 + level) / 2) ** 2 / 4
+    size = n + 2 * added
+    centre = (n * mean + added * (least + most)) / size
+    squares = n * (variance + (mean - centre) ** 2)
+    squares = squares + added * ((least - centre) ** 2 + (most - centre) ** 2)
+    half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
+    return np.minimum(centre - half, mean), np.maximum(centre + half, mean)
+
+
+def bounded_ends(mean: Any, variance: Any, n: Any, level: Any = LEVEL) -> tuple[Any, Any]:
+    """The ends of the confidence intervals of means of values from 0 to 1, see ``ends_of_means``.
 
     Returns:
         (...) lower and (...) upper ends, with 0 <= low <= mean <= high <= 1 and low < high.
     """
-    added = ndtri((1 + level) / 2) ** 2 / 4
-    size = n + 2 * added
-    centre = (n * mean + added) / size
-    squares = n * (variance + (mean - centre) ** 2) + added * (centre**2 + (1 - centre) ** 2)
-    half = stdtrit(size - 1, (1 + level) / 2) * np.sqrt(squares / (size - 1) / size)
-    low = np.maximum(centre - half, 0.0)
-    high = np.minimum(centre + half, 1.0)
-    return np.minimum(low, mean), np.maximum(high, mean)
+    return ends_of_means(metric_of(PRODUCT), mean, variance, 0.0, n, level)
 
 
 def skewed_ends(mean: Any, error: Any, skewness: Any, n: Any, level: Any = LEVEL) -> Any:
@@ -83,15 +153,10 @@ def skewed_ends(mean: Any, error: Any, skewness: Any, n: Any, level: Any = LEVEL
         (...) lower and (...) upper ends; nan where the standard error is.
     """
     quantile = stdtrit(np.maximum(n - 1, 1), (1 + level) / 2)
-    return ends_by_quantile(mean, error, skewness, n, quantile)
-
-
-def ends_by_quantile(mean: Any, error: Any, skewness: Any, n: Any, quantile: Any) -> Any:
-    """The ends of ``skewed_ends``, with the (...) quantiles of Student's t."""
     slope = skewness / np.sqrt(n) / 3
-    return mean - error * _skewed_quantile(quantile, slope), mean - error * _skewed_quantile(
-        -quantile, slope
-    )
+    low = mean - error * _skewed_quantile(quantile, slope)
+    high = mean - error * _skewed_quantile(-quantile, slope)
+    return low, high
 
 
 def _skewed_quantile(quantile: Any, slope: Any) -> Any:
@@ -124,8 +189,8 @@ def rare_differences(metric: Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
 
     For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
     the range, and the other one stays at its mean: what goes further counts. So a share falls to 0,
-    and an age rises to what it is where no UAV flies. A reward changes by what a failure costs, and
-    a cost by the price of the fleet.
+    an age rises to what it is where no UAV flies, and a cost rises by the price of a lost fleet. A
+    reward changes by what a failure costs.
 
     Args:
         metric: The metric; that of missions (``metric_in_missions``) has the range of a time.
@@ -237,31 +302,18 @@ class Moments(NamedTuple):
         measure = metric_of(metric)
         if measure.is_outcome and self._are_outcomes:
             return share_interval(int(self.total), self.n, level)
-        if measure.is_bounded:
-            return self.bounded(level)
-        mean, *ends = self.skewed(level)
-        return Interval(mean, *np.clip(ends, *measure.range).tolist())
+        plain = self.student(level)
+        if rare_values(measure, self.mean) is None and not plain.low < plain.high:
+            return plain
+        skewness = skewness_of(self.squares, self.cubes, self.n)
+        ends = ends_of_means(measure, self.mean, self.squares / self.n, skewness, self.n, level)
+        return Interval(self.mean, *map(float, ends))
 
     @property
     def _are_outcomes(self) -> bool:
         """Whether all values may be 0 or 1: they have the sum and the spread of such."""
         spread = self.total * (self.n - self.total) / self.n
         return self.total.is_integer() and bool(np.isclose(self.squares, spread, atol=1e-9))
-
-    def bounded(self, level: float = LEVEL) -> Interval:
-        """The mean of values from 0 to 1 with the interval of ``bounded_interval``."""
-        low, high = bounded_ends(self.mean, self.squares / self.n, self.n, level)
-        return Interval(self.mean, float(low), float(high))
-
-    def skewed(self, level: float = LEVEL) -> Interval:
-        """The mean with the interval of ``skewed_ends``; of equal values as ``mean_interval``."""
-        plain = self.student(level)
-        if not plain.low < plain.high:
-            return plain
-        error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)
-        skewness = skewness_of(self.squares, self.cubes, self.n)
-        ends = skewed_ends(self.mean, error, skewness, self.n, level)
-        return Interval(self.mean, *map(float, ends))
 
     def student(self, level: float = LEVEL) -> Interval:
         """The mean with the interval of ``mean_interval``."""
@@ -294,7 +346,7 @@ def share_interval(successes: int, n: int, level: float = LEVEL) -> Interval:
 
 def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
     """Mean of values from 0 to 1 with its interval, see ``bounded_ends``."""
-    return Moments.of(values).bounded(level)
+    return Moments.of(values).interval(PRODUCT, level)
 
 
 def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
@@ -312,8 +364,7 @@ def interval_of(
 ) -> Interval:
     """The mean of a metric of missions with the interval that is fit for it.
 
-    Wilson's interval for outcomes of ``success``, the ``bounded_interval`` for the collection ratio
-    and the product, and for all others that of ``skewed_ends``, within the range of the metric.
+    Wilson's interval for outcomes of ``success``, and that of ``ends_of_means`` for all others.
     """
     return Moments.of(values).interval(metric, level)
 
@@ -324,8 +375,8 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
     What differs from point to point is no chance, so the interval rests on the variance within the
     points. A replication has the same realisation at all points, so what it adds to the mean is
     counted as one contribution, as of a cluster of a stratified sample: this is the linearised
-    variance of W. G. Cochran (Sampling Techniques, 3rd edition, 1977, Section 11.18). A bounded
-    metric has the interval of ``bounded_ends`` with the effective number of missions of L. Kish
+    variance of W. G. Cochran (Sampling Techniques, 3rd edition, 1977, Section 11.18). Where rare
+    values are added (``ends_of_means``), it is with the effective number of missions of L. Kish
     (Survey Sampling, 1965, Section 8.2): all missions, divided by how much more the mean varies
     than if every point had replications of its own. N. Dean and M. Pagano (Journal of Survey
     Statistics and Methodology 3 (2015) 484-503) find it good for shares of clustered samples.
@@ -346,23 +397,24 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
     residuals = np.where(present, values - means, 0.0)
     mean = float(means.mean())
     common = float(((residuals / n).sum(axis=1) ** 2).sum()) / points**2  # variance of the mean
-    if measure.is_bounded:
+    replications = int(present.any(axis=1).sum())
+    if replications == 1 and not measure.is_bounded:
+        return Interval(mean, np.nan, np.nan)
+    if rare_values(measure, mean) is None:
+        size = float(replications)
+        variance = common * replications
+    else:
         alone = float(((residuals**2).sum(axis=0) / n**2).sum()) / points**2
         missions = points**2 / float((1 / n).sum())
+        effect = float(points)
         if alone:
             effect = min(max(common / alone, 1.0), points)
-        else:
-            effect = points
-        low, high = bounded_ends(mean, alone * missions, missions / effect, level)
-        return Interval(mean, float(low), float(high))
-    replications = int(present.any(axis=1).sum())
-    if replications == 1:
-        return Interval(mean, np.nan, np.nan)
-    error = np.sqrt(common * replications / (replications - 1))
+        size = missions / effect
+        variance = alone * missions
     cubes = float(((residuals / n).sum(axis=1) ** 3).sum()) / points**3
     skewness = skewness_of(common, cubes, replications)
-    ends = skewed_ends(mean, error, skewness, replications, level)
-    return Interval(mean, *np.clip(ends, *measure.range).tolist())
+    ends = ends_of_means(measure, mean, variance, skewness, size, level)
+    return Interval(mean, *map(float, ends))
 
 
 def summary(
@@ -391,7 +443,7 @@ def summary(
     for group, part in group_rows(missions, by):
         for metric in metrics_in(missions):
             if n := int(part[metric].count()):
-                ends = _interval_of_group(part, metric_in_missions(missions, metric), level, strata)
+                ends = _interval_of_group(part, metric_in_missions(part, metric), level, strata)
                 rows.append((*group, metric, *ends, n))
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
@@ -404,7 +456,8 @@ def column_intervals(
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.
         metric: The metric; by default one without bounds. Values of ``success`` that are no
-            outcomes 0 or 1, but means of such, have the interval of bounded values.
+            outcomes 0 or 1, but means of such, have the interval of bounded values. The ends of its
+            range may be (K,) arrays.
         levels: The confidence level, or (K,) levels.
 
     Returns:
@@ -416,13 +469,9 @@ def column_intervals(
     level = pd.Series(levels, index=values.columns)
     deviations = values - mean
     skewness = skewness_of((deviations**2).sum(), (deviations**3).sum(), n)
-    ends = skewed_ends(mean, values.sem(), skewness, np.maximum(n, 1), level)
-    low, high = (end.clip(*measure.range) for end in ends)
+    size = np.maximum(n, 1)
+    low, high = ends_of_means(measure, mean, values.var(ddof=0), skewness, size, level)
     table = pd.DataFrame({"mean": mean, "low": low, "high": high, "n": n})
-    if measure.is_bounded:
-        some = n > 0
-        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level[some])
-        table.loc[some, ["low", "high"]] = np.transpose(ends)
     if measure.is_outcome:
         rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
         successes = (mean * n)[rows].round().astype(int)

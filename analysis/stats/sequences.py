@@ -15,7 +15,9 @@ so far.
 
 Values without bounds have an asymptotic sequence (Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas,
 Time-uniform central limit theory and asymptotic confidence sequences, Annals of Statistics 52,
-2024, Theorem 2.2), which takes means of many missions as nearly normal.
+2024, Theorem 2.2), which takes means of many missions as nearly normal. That is wrong where rare
+missions fail and none of these has been seen; so where it is known by how much a failure changes
+the values, their variance is that with two failures more, one upwards and one downwards.
 
 The functions are compiled, and use only arithmetic that every machine does in the same way.
 """
@@ -41,6 +43,7 @@ SEQUENCE = np.dtype(
         ("error", float),  # the probability that the sequence fails to cover the mean at some time
         ("least", float),  # what values can be
         ("most", float),
+        ("failure", float),  # by how much a rare failure changes a value without bounds, or 0
         ("values", np.int64),  # the number of values so far
         ("mean", float),  # of the values so far
         ("squares", float),  # the sum of their squared deviations from the mean
@@ -59,29 +62,33 @@ SEQUENCE = np.dtype(
 )
 
 
-def new_sequence(least: float, most: float, error: float = 0.05) -> np.ndarray:
+def new_sequence(
+    least: float, most: float, error: float = 0.05, failure: float = 0.0
+) -> np.ndarray:
     """A sequence without values.
 
     Args:
         least: The smallest value that there can be, or ``-inf``.
         most: The largest one, or ``inf``.
         error: The probability that the sequence fails to cover the mean at some time.
+        failure: By how much a rare failure changes a value without bounds; 0 if that is not known.
 
     Returns:
         (1,) ``SEQUENCE``, for ``add_values`` and ``sequence_ends``.
     """
     sequence = np.zeros(1, SEQUENCE)
-    start_sequence(sequence, least, most, error)
+    start_sequence(sequence, least, most, failure, error)
     return sequence
 
 
 @kernel
-def start_sequence(sequence, least, most, error):
+def start_sequence(sequence, least, most, failure, error):
     """Make a sequence one without values, see ``new_sequence``."""
     s = sequence[0]
     s.error = error
     s.least = least
     s.most = most
+    s.failure = failure
     s.values = 0
     s.mean = 0.0
     s.squares = 0.0
@@ -167,7 +174,7 @@ def sequence_ends(sequence):
     surprise = -2.0 * log(s.error)
     rho_squared = (surprise + log(surprise) + 1.0) / _NARROWEST_AT
     growth = s.values * rho_squared + 1.0
-    variance = s.squares / (s.values - 1)
+    variance = (s.squares + 2.0 * s.failure * s.failure) / (s.values - 1)
     factor = 2.0 * growth / (s.values * s.values * rho_squared)
     half = math.sqrt(variance * factor * log(math.sqrt(growth) / s.error))
     return max(s.least, s.mean - half), min(s.most, s.mean + half)

@@ -11,8 +11,10 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.study.stopping import MOST, Line, StrictTable
 from dess.model.state import types_of
-from dess.physics.fleet import type_of
+from dess.physics.consumption import PERCENT
+from dess.physics.fleet import slowest, type_of
 from dess.physics.section import Integer, Number
+from dess.physics.wind import constants
 from dess.scenario.scenario import ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.
@@ -234,6 +236,31 @@ class Costs(StrictTable):
         """What it costs if every mission loses this number of UAVs, in the currency."""
         return self.paid_missions * self.lost_uav * uavs
 
+    def most_running(
+        self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]
+    ) -> np.ndarray:
+        """The most that missions may cost beside the purchase, in the currency.
+
+        All UAVs are in the air until the longest mission ends, and are lost.
+
+        Args:
+            spaces: The scenario of every design point.
+            missions: (n,) columns of the missions: ``point`` and ``uavs``.
+        """
+        points = np.asarray(missions["point"])
+        slots = np.array([space.max_slots for space in spaces])
+        hours = slots * [self.seconds_per_slot(space) / 3600 for space in spaces]
+        spent = slots * [most_battery_per_slot(space) / 100 for space in spaces]
+        of_uav = self.lost_uav + (self.charge + self.pack / self.pack_cycles) * spent
+        of_fleet = of_uav[points] * np.asarray(missions["uavs"])
+        return self.paid_missions * (of_fleet + self.hour * hours[points])
+
+    def seconds_per_slot(self, space: ScenarioSpace) -> float:
+        """The length of a slot [s]; 0 where it is not known."""
+        if space.units:
+            return space.units.slot
+        return self.slot_seconds or 0.0
+
     def parts(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
     ) -> dict[str, np.ndarray]:
@@ -259,7 +286,7 @@ class Costs(StrictTable):
         price_of_battery = self.charge or self.pack
         charged = self._sum_of(uavs, "charged", mission, len(fleet), price_of_battery)
         lost = self._sum_of(uavs, "down", mission, len(fleet), self.lost_uav)
-        seconds = [space.units.slot if space.units else self.slot_seconds or 0 for space in spaces]
+        seconds = [self.seconds_per_slot(space) for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
         of_uavs = self._prices_of_fleets(spaces, points, fleet)
         amounts = {PURCHASE: self.purchase_of(of_uavs, pads[points])}
@@ -310,6 +337,16 @@ def has_priced_types(space: ScenarioSpace) -> bool:
 def _prices_all_uavs(space: ScenarioSpace) -> bool:
     """Whether all types of UAVs of a scenario have prices of their own."""
     return has_priced_types(space) and all(kind.price is not None for kind in space.fleet)
+
+
+def most_battery_per_slot(space: ScenarioSpace) -> float:
+    """The most that a slot in the air takes of a battery [%]."""
+    if space.consumption.is_on:
+        of_slots = space.consumption.constants(slowest(space.fleet))
+        most = of_slots["dearest_slot"] / PERCENT
+    else:
+        most = 1.0 + constants(space.wind, space.size)["wind_most"]
+    return space.flight_cost * most
 
 
 def spent_battery(

@@ -1,7 +1,6 @@
 """Sequential stopping: add replications until the confidence intervals are narrow enough."""
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import Annotated, Any, NamedTuple, Self, get_args
 
 import numpy as np
@@ -14,14 +13,11 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from scipy.special import stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, MEASURES, metric_of
+from dess.analysis.metrics import ALWAYS, MEASURES, Metric, metric_in_missions, metric_of
 from dess.analysis.stats.intervals import (
-    LEVEL,
-    bounded_ends,
-    ends_by_quantile,
+    ends_of_means,
     share_half_width,
     skewness_of,
 )
@@ -145,11 +141,10 @@ class Precision(StrictTable):
     """The rule that missions are added to a cell until its 95 % intervals are narrow enough.
 
     The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
-    Wilson's interval for ``success``, the interval of a bounded mean for the collection ratio and
-    the product, Student's t with a correction for skewness for the others. They are not
-    post-stratified by the number of UAVs, so where it is drawn, the printed intervals are narrower,
-    and they are not cut off at the ends of a metric's range. The *stopping point* is the first
-    n >= ``first`` at which all targets are met with n, n + 1, ..., n + ``look_ahead`` missions.
+    Wilson's interval for ``success``, and those of ``stats.intervals.ends_of_means`` for the
+    others. They are not post-stratified by the number of UAVs, so where it is drawn, the printed
+    intervals are narrower. The *stopping point* is the first n >= ``first`` at which all targets
+    are met with n, n + 1, ..., n + ``look_ahead`` missions.
     Without the look-ahead, a sample whose interval is narrow by chance would stop too
     early. The cell keeps the missions of the look-ahead.
 
@@ -160,10 +155,9 @@ class Precision(StrictTable):
     in the order of their replications, so it is the same whether or not a run was interrupted.
 
     After stopping, the coverage of the intervals is about as good as with a fixed number of
-    missions. It is lower where a rare event changes the reward strongly, because Student's
-    interval is too narrow until the event occurs. A larger ``first`` helps. The other intervals
-    allow for failures that no mission has shown yet, so a narrow one takes many missions: a
-    half-width of one percentage point takes about 100 to 200 missions even if none of them fails.
+    missions. The intervals allow for failures that no mission has shown yet, so a narrow one takes
+    many missions: a half-width of one percentage point takes about 100 to 200 missions even if none
+    of them fails.
 
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
     a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644. In contrast to the article,
@@ -234,7 +228,7 @@ class Precision(StrictTable):
         stop = self._stop(self._last_miss(np.max(list(ratios.values()), axis=0)))
         rows = []
         for metric, target in self.targets.items():
-            means, widths = running_interval(metric, values_in(sample, metric))
+            means, widths = _running_interval_in(sample, metric)
             is_met = len(means) - int(self._last_miss(ratios[metric])[-1]) > self.look_ahead
             mean, width, allowed = (
                 float(column[-1]) for column in (means, widths, target.width(means))
@@ -245,7 +239,7 @@ class Precision(StrictTable):
 
     def _excess(self, metric: MetricName, sample: Mapping[str, np.ndarray]) -> np.ndarray:
         """Half-width / target after 1..n missions; at most 1 where the target is met."""
-        means, widths = running_interval(metric, values_in(sample, metric))
+        means, widths = _running_interval_in(sample, metric)
         allowed = self.targets[metric].width(means)
         never = np.where(widths > 0, np.inf, 0.0)
         return np.divide(widths, allowed, out=never, where=allowed > 0)
@@ -276,7 +270,15 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
     return np.asarray(sample[metric], float)
 
 
-def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _running_interval_in(
+    sample: Mapping[str, np.ndarray], metric: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """The ``running_interval`` of a metric of missions, with the range that it has in them."""
+    values = values_in(sample, metric)
+    return running_interval(metric_in_missions(sample, metric), values)
+
+
+def running_interval(metric: str | Metric, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Means of the first 1..n values, and the half-widths of their 95 % confidence intervals.
 
     Args:
@@ -287,14 +289,15 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         (n,) means and (n,) half-widths. Without bounds, the half-width of a single value is
         infinite, and so is that of no value.
     """
+    measure = metric_of(metric)
     sample = np.asarray(values, float)
     present = ~np.isnan(sample)
     if not present.all():
-        means, widths = running_interval(metric, sample[present])
+        means, widths = running_interval(measure, sample[present])
         place = np.cumsum(present)
         return np.append(0.0, means)[place], np.append(np.inf, widths)[place]
     counts = np.arange(1, len(sample) + 1)
-    if metric_of(metric).is_outcome:
+    if measure.is_outcome:
         successes = np.cumsum(sample)
         return successes / counts, share_half_width(successes, counts)
     # The values are shifted by the first one, so that equal values give a width of exactly 0.
@@ -302,21 +305,11 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
     means = np.cumsum(shifted) / counts
     before = np.concatenate([[0.0], means[:-1]])[: len(sample)]
     squares = np.cumsum((counts - 1) / counts * (shifted - before) ** 2)  # Welford
-    if metric_of(metric).is_bounded:
-        low, high = bounded_ends(sample[:1] + means, squares / counts, counts)
-        return sample[:1] + means, (high - low) / 2
     sums = np.cumsum(shifted**3) - 3 * means * np.cumsum(shifted**2)
     skewness = skewness_of(squares, sums + 2 * counts * means**3, counts)
-    errors = np.sqrt(squares / np.maximum(counts - 1, 1) / counts)
-    quantiles = _student_quantiles(1 << len(sample).bit_length())[: len(sample)]
-    low, high = ends_by_quantile(means, errors, skewness, counts, quantiles)
+    means = sample[:1] + means
+    low, high = ends_of_means(measure, means, squares / counts, skewness, counts)
     widths = (high - low) / 2
-    widths[:1] = np.inf
-    return sample[:1] + means, widths
-
-
-@cache
-def _student_quantiles(n: int) -> np.ndarray:
-    """The (n,) quantiles of Student's t for samples of 1..n values."""
-    freedom = np.maximum(np.arange(n), 1)
-    return stdtrit(freedom, (1 + LEVEL) / 2)
+    if not measure.is_bounded:
+        widths[:1] = np.inf
+    return means, widths

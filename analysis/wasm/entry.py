@@ -84,7 +84,9 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "values": (_F8, 2),  # (B, METRICS)
     "baseline": (_F8, 2),  # (B, METRICS) values of other missions with the same replications
     "totals": (_F8, 2),  # (METRICS, TOTALS)
-    "bounds": (_F8, 2),  # (METRICS, 3) the least and the largest value, and the error of the ends
+    # (METRICS, 4) the least and the largest value, by how much a failure changes a value of which
+    # these are not known, and the error of the ends.
+    "bounds": (_F8, 2),
     "sequences": (SEQUENCE, 1),  # (METRICS,) the confidence sequences of the means
     "ends": (_F8, 2),  # (METRICS, 2) the ends of the intervals of the means
 }
@@ -321,8 +323,6 @@ def measure(table, count):
 @kernel
 def _cost(prices, uav_prices, pads, record, uavs):
     """The cost of a mission, summed up from the parts of ``dess.analysis.study.prices``."""
-    uav = prices[0]
-    pad = prices[1]
     charge = prices[2]
     hour = prices[3]
     lost_uav = prices[4]
@@ -332,15 +332,45 @@ def _cost(prices, uav_prices, pads, record, uavs):
     for i in range(record.uavs):
         charged += uavs[i].charged
         lost += uavs[i].down
-    price_of_uavs = uav * record.uavs
-    if len(uav_prices) > 0:
-        price_of_uavs = 0.0
-        for i in range(record.uavs):
-            price_of_uavs += uav if np.isnan(uav_prices[i]) else uav_prices[i]
-    purchase = price_of_uavs + pad * pads
+    purchase = _purchase(prices, uav_prices, pads, record.uavs)
     charging = missions * charge * charged / 100
     hours = missions * hour * (record.slots * seconds / 3600)
     return purchase + charging + hours + missions * lost_uav * lost
+
+
+@kernel
+def _purchase(prices, uav_prices, pads, uavs):
+    """What UAVs and pads cost when they are bought."""
+    uav = prices[0]
+    pad = prices[1]
+    price_of_uavs = uav * uavs
+    if len(uav_prices) > 0:
+        price_of_uavs = 0.0
+        for i in range(uavs):
+            price_of_uavs += uav if np.isnan(uav_prices[i]) else uav_prices[i]
+    return price_of_uavs + pad * pads
+
+
+@kernel
+def _bound_costs(table, bounds):
+    """Write what is known of costs: the purchase of the smallest fleet, and what a loss costs.
+
+    All UAVs of the largest fleet are lost, and the mission lasts until its horizon.
+    """
+    prices = _array1(table, _AT.prices, _F8)
+    if len(prices) == 0:
+        return
+    mission = _array1(table, _AT.constants, _MISSION)[0]
+    smallest = _array3(table, _AT.ranges, _I8)[0, 0, 0]
+    largest = _array3(table, _AT.ranges, _I8)[0, 0, 1]
+    hour = prices[3]
+    lost_uav = prices[4]
+    missions = prices[5]
+    seconds = prices[6]
+    uav_prices = _array1(table, _AT.uav_prices, _F8)
+    bounds[_COST, 0] = _purchase(prices, uav_prices, mission.pads, smallest)
+    hours = mission.max_slots * seconds / 3600
+    bounds[_COST, 2] = missions * (lost_uav * largest + hour * hours)
 
 
 @kernel
@@ -355,10 +385,16 @@ def subtract(table, count):
 
 @kernel
 def begin(table, is_difference):
-    """Begin the totals and the confidence sequences, of metrics or of their differences."""
+    """Begin the totals and the confidence sequences, of metrics or of their differences.
+
+    What is known of costs follows from the prices, which a reader of a page may have changed. The
+    differences of two settings have the bounds of both, which the caller writes.
+    """
     totals = _array2(table, _AT.totals, _F8)
     bounds = _array2(table, _AT.bounds, _F8)
     sequences = _array1(table, _AT.sequences, _SEQUENCE)
+    if not is_difference:
+        _bound_costs(table, bounds)
     for column in range(len(bounds)):
         for number in range(totals.shape[1]):
             totals[column, number] = 0.0
@@ -367,7 +403,9 @@ def begin(table, is_difference):
         if is_difference:
             most = most - least
             least = -most
-        start_sequence(sequences[column : column + 1], least, most, bounds[column, 2])
+        failure = bounds[column, 2]
+        error = bounds[column, 3]
+        start_sequence(sequences[column : column + 1], least, most, failure, error)
 
 
 @kernel

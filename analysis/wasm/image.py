@@ -259,7 +259,7 @@ def _arrays_of(
         "values": np.zeros((missions, len(METRICS))),
         "baseline": np.zeros((missions, len(METRICS))),
         "totals": np.zeros((len(METRICS), len(TOTALS))),
-        "bounds": _bounds_of(space),
+        "bounds": _bounds_of(space, fleet),
         "sequences": np.zeros(len(METRICS), SEQUENCE),
         "ends": np.zeros((len(METRICS), 2)),
     }
@@ -322,13 +322,18 @@ def _factors_of(space: ScenarioSpace) -> np.ndarray:
     return factors
 
 
-def _bounds_of(space: ScenarioSpace) -> np.ndarray:
-    """(METRICS, 3) the least and the largest value of each metric, and the error of intervals."""
-    bounds = np.empty((len(METRICS), 3))
+def _bounds_of(space: ScenarioSpace, fleet: int) -> np.ndarray:
+    """(METRICS, 4) what is known of the values of each metric, and the error of intervals.
+
+    Args:
+        space: The scenario.
+        fleet: The most UAVs that any setting has.
+    """
+    bounds = np.empty((len(METRICS), 4))
     for column, name in enumerate(METRICS):
         unit = metric_of(name).in_units.column if space.units else name
-        least, most = metric_for_length(unit, space.max_slots, space.units).range
-        bounds[column] = least, most, 1 - LEVEL
+        metric = metric_for_length(unit, space.max_slots, space.units, fleet)
+        bounds[column] = *metric.range, metric.failure, 1 - LEVEL
     return bounds
 
 

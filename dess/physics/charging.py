@@ -258,5 +258,5 @@ def write_use(mission, uavs, out):
         charged += uavs[i].slots_charging
     out.pad_requests = mission.pad_requests
     out.queue = waited / mission.slot
-    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else 0.0
+    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else np.nan
     out.utilisation = charged / (mission.pads * mission.slot)

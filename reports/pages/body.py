@@ -33,9 +33,9 @@ TERMS = {
     "paired": "taken in missions with the same random draws",
     "upper bound": "no policy can expect to collect more",
     "95 % intervals": "such an interval holds the true value in 95 of 100 studies. Of success it "
-    "is Wilson's; of other shares it holds for all distributions between 0 and 1, so it is wider; "
-    "of other means it is Student's t, corrected for skewness. Intervals of differences allow for "
-    "failures that are too rare to be seen",
+    "is Wilson's. Of a metric of which is known what a failure changes it is Student's t with an "
+    "allowance for failures too rare to be seen, so it is wider and not symmetric. Of other means "
+    "it is Student's t, corrected for skewness",
     "Peak age of information": "the mean of the ages just before a node is emptied. A node that no "
     "UAV empties has no peak, but counts in the mean age, so the mean may lie above the peak",
     "Holm": "a correction of p-values for the number of comparisons",

@@ -110,7 +110,7 @@ def _describe_sea(scenario: str) -> str:
 
 
 def leading_metric(results: Results, metric: str | None) -> str:
-    """The metric that the page is about: of a search for a fleet, that of its tightest requirement.
+    """The metric that the page is about: of a search for a fleet, that of what decides it.
 
     Args:
         results: The study.
@@ -120,7 +120,7 @@ def leading_metric(results: Results, metric: str | None) -> str:
         InputError: If there is no such metric.
     """
     if metric is None and requirements_of(results):
-        return search_of(results).tightest_requirement()[0].column
+        return search_of(results).deciding_requirement()[0].column
     return ranking_metric(results, metric)
 
 
@@ -266,7 +266,7 @@ def draw_typical_mission(results: Results) -> list[Drawing]:
     policy = search.best.policy
     if is_path(policy):
         return []
-    column = search.tightest_requirement()[0].column
+    column = search.deciding_requirement()[0].column
     replication = typical_replication(search.shown_missions, column)
     mission = resimulate(results, policy, search.shown_point, replication)
     fleet = fleets_in_words(results)[search.shown_point]

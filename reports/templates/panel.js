@@ -59,7 +59,7 @@ const isChecked = (chosen) => keyOf(chosen) === keyOf(data.check);
  * @type {(name: string, chosen: Choice, error?: number | null) => Track}
  */
 function trackOf(name, chosen, error = null) {
-    const series = new Series(module, image, settingOf(chosen), error), paid = prices();
+    const paid = prices(), series = new Series(module, image, settingOf(chosen), paid, error);
     return new Track(series, {
         name, key: `${keyOf(chosen)} ${paid}`, setting: settingOf(chosen), policy: image.policies[chosen.policy], prices: paid,
     });

@@ -35,7 +35,9 @@
 const PORTION = 120; // the time that a portion of missions should take [ms]
 const MOST_WORKERS = 8;
 const SUMMED = ["values", "baseline", "totals", "sequences", "ends"]; // what a series needs
-const BOUNDS = 3; // numbers of a metric in the array of that name; the last is the error
+// Numbers of a metric in the array of that name: the least and the largest value, by how much a
+// failure changes a value, and the error.
+const BOUNDS = 4, FAILURE = 2;
 const rowsOf = (/** @type {Image} */ image, /** @type {string} */ name) =>
     image.arrays.find((array) => array.name === name)?.shape[0] ?? 0;
 
@@ -45,9 +47,10 @@ class Series {
      * @param {WebAssembly.Module} module
      * @param {Image} image
      * @param {Record<string, number>} setting
+     * @param {number[]} prices
      * @param {number | null} error - the probability that an interval fails, if not that of the image
      */
-    constructor(module, image, setting, error = null) {
+    constructor(module, image, setting, prices = [], error = null) {
         const arrays = image.arrays.map((array) =>
             array.bytes || SUMMED.includes(array.name) ? array : {...array, shape: array.shape.map(() => 0)});
         this.module = module;
@@ -58,6 +61,7 @@ class Series {
             const bounds = this.engine.floats("bounds");
             for (let place = BOUNDS - 1; place < bounds.length; place += BOUNDS) bounds[place] = error;
         }
+        this.engine.floats("prices").set(prices);
         this.engine.call("begin", 0);
     }
 
@@ -71,7 +75,7 @@ class Series {
         const [ours, theirs] = [before, after].map(({engine}) => engine.floats("bounds"));
         for (let metric = 0; metric < bounds.length; metric += BOUNDS) {
             bounds[metric] = Math.min(ours[metric], theirs[metric]);
-            bounds[metric + 1] = Math.max(ours[metric + 1], theirs[metric + 1]);
+            for (const place of [metric + 1, metric + FAILURE]) bounds[place] = Math.max(ours[place], theirs[place]);
         }
         series.engine.call("begin", 1);
         return series;

@@ -14,7 +14,16 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from dess.analysis.metrics import AGE, MOST_SLOTS, PRODUCT, REWARD, metric_in_missions
+from dess.analysis.metrics import (
+    AGE,
+    LEAST_COST,
+    MOST_COST,
+    MOST_SLOTS,
+    PRODUCT,
+    REWARD,
+    metric_in_missions,
+    metric_of,
+)
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
@@ -26,6 +35,7 @@ from dess.analysis.stats.intervals import (
     stratified_interval,
 )
 from dess.analysis.stats.learners import compare_crossed
+from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
 from dess.analysis.study.cheapest import Cheapest, Setting
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
@@ -132,7 +142,7 @@ def told(ends: tuple[np.ndarray, np.ndarray], truth: float) -> str:
 
 def table_of_the_docs() -> str:
     """Of the intervals of some products."""
-    rows = [["missions", "n", "Student's t", "one 0 and one 1 added", "betting"]]
+    rows = [["missions", "n", "Student's t", "0 and 1 added", "betting"]]
     cases = [("no failures", 300), ("one failure in 100", 100), ("one failure in 100", 1000)]
     for name, n in [*cases, ("one failure in 20", 300), ("failures but one in 200", 100)]:
         draw, mean = PRODUCTS[name]
@@ -355,6 +365,100 @@ def table_of_watches() -> str:
 def test_the_table_of_ages_and_lengths_of_the_docs_is_measured():
     page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
     assert table_of_watches() in page.read_text("utf-8")
+
+
+# Means that the loss of a UAV changes: in most samples none is lost
+
+LOSSES = (0.0025, 0.007, 0.035)  # the share of the missions that lose a UAV, of two
+SIZES = (50, 100, 300)
+_PURCHASE, _LOSS = 10_000.0, 4e6  # for instance 200 missions a year, in which 20,000 EUR are lost
+_RANGES = {
+    "cost": {LEAST_COST: _PURCHASE, MOST_COST: _PURCHASE + 200 + 2 * _LOSS},
+    "uav_slots": {MOST_SLOTS: LONGEST, "uavs": 2},
+    "collected": {"residual": 0.0},
+}
+
+
+def with_losses(metric: str, share: float, size: tuple[int, int]) -> tuple[np.ndarray, float]:
+    """Values of missions of which few lose a UAV, and their true mean."""
+    generator = rng(41, *size)
+    is_lost = generator.random(size) < share
+    late = generator.random(size)  # how much of the mission was left
+    if metric == "cost":
+        plain = _PURCHASE + generator.gamma(16, 4, size)
+        return plain + _LOSS * is_lost, _PURCHASE + 64 + share * _LOSS
+    if metric == REWARD:
+        return generator.normal(200, 20, size) - 400 * is_lost, 200 - 400 * share
+    if metric == AGE:
+        return generator.gamma(16, 2.5, size) + 150 * late * is_lost, 40 + 75 * share
+    if metric == "slots":
+        return generator.normal(150, 10, size) + 350 * late * is_lost, 150 + 175 * share
+    if metric == "uav_slots":
+        return generator.normal(800, 20, size) - 500 * late * is_lost, 800 - 250 * share
+    if metric == "collected":
+        return generator.normal(90, 2, size) - 90 * late * is_lost, 90 - 45 * share
+    raise ValueError(metric)
+
+
+def of_means(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of the intervals of the means of samples (trials, n), as they are printed."""
+    known = _RANGES.get(metric, {MOST_SLOTS: LONGEST})
+    missions = pd.DataFrame({metric: values.ravel(), **known})
+    if metric == "collected":
+        missions["residual"] = 100.0 - missions[metric]
+    ends = column_intervals(pd.DataFrame(values.T), metric_in_missions(missions, metric))
+    return ends["low"].to_numpy(), ends["high"].to_numpy()
+
+
+@pytest.mark.parametrize("n", SIZES)
+@pytest.mark.parametrize("metric", ["cost", REWARD, AGE, "slots", "uav_slots", "collected"])
+def test_means_cover_where_losses_are_rare(metric, n):
+    for share in LOSSES:
+        values, truth = with_losses(metric, share, (TRIALS, n))
+        low, high = of_means(metric, values)
+        assert np.mean((low <= truth) & (truth <= high)) >= 0.93
+        assert (low < high).all()
+        if metric == "cost":
+            assert (low >= _PURCHASE).all()
+
+
+def table_of_costs() -> str:
+    """Of the intervals of mean costs, with their mean lengths in 1,000 EUR a year."""
+    rows = [["missions with a loss", "n", "Student's t", "ours"]]
+    for share in LOSSES:
+        for n in SIZES:
+            values, truth = with_losses("cost", share, (TRIALS, n))
+            cells = []
+            for low, high in (student(values), of_means("cost", values)):
+                coverage = np.mean((low <= truth) & (truth <= high))
+                cells.append(f"{100 * coverage:.1f} %, {np.mean(high - low) / 1000:,.0f}")
+            rows.append([f"{100 * share:g} %", str(n), *cells])
+    return in_markdown(*rows)
+
+
+def test_the_table_of_costs_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_costs() in page.read_text("utf-8")
+
+
+@pytest.mark.parametrize("trials", [40, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("metric", ["cost", REWARD])
+def test_sequences_of_the_panel_cover_at_all_times_where_losses_are_rare(metric, trials):
+    """From the first mission to the last, as a reader watches them."""
+    failure = {"cost": 2 * _LOSS, REWARD: metric_of(REWARD).failure}[metric]
+    least = {"cost": _PURCHASE, REWARD: -np.inf}[metric]
+    for share in LOSSES:
+        values, truth = with_losses(metric, share, (trials, 1000))
+        covers = 0
+        for of_trial in values:
+            sequence = new_sequence(least, np.inf, failure=failure)
+            is_covered = True
+            for mission in of_trial[:, None]:
+                add_values(sequence, mission)
+                low, high = sequence_ends(sequence)
+                is_covered &= low <= truth <= high
+            covers += is_covered
+        assert covers / trials >= (0.93 if trials >= 1000 else 0.95 - error(trials))
 
 
 SKEWED: dict[str, Drawing] = {

@@ -172,6 +172,14 @@ class FleetAnswer:
         return numbers.format_money(self.cost, self.results.prices.unit)
 
     @property
+    def _ends_of_cost_in_words(self) -> str:
+        """The interval of the mean cost, to follow it; empty if it is the same in all missions."""
+        selected = self.fleets[self.fleets["selected"]]
+        written = metric_of(COST).written(*selected[interval_columns(COST)].iloc[0])
+        _, space, ends = written.partition(" ")
+        return space + ends
+
+    @property
     def _where(self) -> str:
         """The policy and the condition, as the beginning of a sentence."""
         where = f"With the policy `{self.policy}`"
@@ -186,7 +194,7 @@ class FleetAnswer:
         parts = cost_parts_in_words(self.results, self.policy, self.points)
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {self.cost_in_words}{parts}."
+            f"for {self.cost_in_words}{self._ends_of_cost_in_words}{parts}."
         )
 
     def estimates_sentence(self) -> str:
@@ -216,7 +224,7 @@ class FleetAnswer:
             where = ","
         text = f"In {source}{where} {numbers.join_words(texts)}."
         if len(self.tightest_first) > 1:
-            text += f" The tightest requirement is the {self.tightest_first[0].metric.within}."
+            text += f" Nearest to what is required is its {self.tightest_first[0].metric.within}."
         return text
 
     def measured_in_words(self) -> str:
@@ -483,20 +491,22 @@ class FleetSearch:
             )
         return pd.DataFrame(rows).astype({"point": "Int64"})
 
-    def tightest_requirement(self) -> tuple[Requirement, str]:
+    def deciding_requirement(self) -> tuple[Requirement, str]:
         """The requirement that the answer is chosen by, and the condition under which it is.
 
         It is the one that alone asks for the most expensive fleet, with the policy of the answer;
-        of several of these, the one that the answer keeps with the least to spare.
+        of several of these, the one that the answer keeps with the least to spare. A fleet costs
+        its mean over the conditions: what chance makes of its cost under each decides nothing.
         """
         rows = judge_settings(self.results)
         rows = rows[rows["policy"] == self.best.policy]
+        cost_of_fleets = rows.groupby("fleet")[COST].mean()
 
-        def tightness(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
+        def need_and_lack(requirement: Requirement, part: pd.DataFrame) -> tuple[float, float]:
             keeps = requirement.margin(part[requirement.column]) >= 0
             cheapest_cost = np.inf
             if keeps.any():
-                cheapest_cost = part[COST][keeps].min()
+                cheapest_cost = cost_of_fleets[part["fleet"][keeps]].min()
             room = relative_spare(part, requirement)
             selected = part["point"].isin(self.best.points)
             if selected.any():
@@ -511,7 +521,7 @@ class FleetSearch:
             for asked_requirement in requirements_of(self.results)
             for name, part in parts
         ]
-        requirement, condition, _ = max(asked, key=lambda found: tightness(found[0], found[2]))
+        requirement, condition, _ = max(asked, key=lambda found: need_and_lack(found[0], found[2]))
         return requirement, condition
 
 

@@ -103,9 +103,9 @@ def draw_cost_fronts(results: Results) -> Iterator[Drawing]:
 
 
 def draw_cheapest(results: Results) -> Drawing:
-    """The cost against the metric of the tightest requirement of a search, with the answer."""
+    """The cost against the metric of the requirement that decides a search, with the answer."""
     search = search_of(results)
-    requirement, condition = search.tightest_requirement()
+    requirement, condition = search.deciding_requirement()
     rows = verdicts.judge_settings(results)
     rows = rows[(rows["policy"] == search.best.policy) & (rows["condition"] == condition)]
     is_answer = rows["point"].isin(search.best.points)

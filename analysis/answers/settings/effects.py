@@ -4,6 +4,7 @@ average_over_others(results, ["uavs"])  # by number of UAVs
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from dess.analysis.metrics import (
     PRODUCT,
     Metric,
     check_ranking_metric,
+    metric_in_groups,
     metric_in_missions,
     metric_of,
 )
@@ -133,12 +135,13 @@ def _average_labelled(
         if not sampled:  # only replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
+        of_cells = metric_in_groups(part, metric, ["cell"], wide.columns.to_frame(name="cell"))
         if sampled:
-            ends = column_intervals(wide, measure)
+            ends = column_intervals(wide, of_cells)
         else:
             at_points = by_replication(part, metric, "point")
             at_points = at_points.reindex(columns=range(len(cell_of)))
-            ends = _intervals_over_points(at_points, cell_of, measure, level_after(seen))
+            ends = _intervals_over_points(at_points, cell_of, of_cells, level_after(seen))
         left = np.ones(len(cells), bool)
         if (sizes == 1).all():  # a cell is a design point
             left[cell_of] = points_left(results, str(name))
@@ -160,16 +163,19 @@ def _intervals_over_points(
     Args:
         values: (R, K) a row per replication and a column per design point.
         cell_of: (K,) the cell of every point.
-        metric: The metric.
+        metric: The metric; the ends of its range may be arrays, with one for every cell.
         levels: The confidence level of every cell.
     """
     rows = []
-    for cell in range(cell_of.max() + 1):
+    cells = cell_of.max() + 1
+    least, most = (np.broadcast_to(end, cells) for end in metric.range)
+    for cell in range(cells):
         complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
         level = float(levels[cell])
         ends = Interval(np.nan, np.nan, np.nan)
         if len(complete):
-            ends = stratified_interval(complete, metric, level)
+            of_cell = replace(metric, least=float(least[cell]), most=float(most[cell]))
+            ends = stratified_interval(complete, of_cell, level)
         rows.append((*ends, len(complete)))
     return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
 

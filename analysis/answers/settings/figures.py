@@ -33,6 +33,9 @@ from dess.analysis.tables import INTERVALS
 MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
 
 
+_LEAST_AROUND = 0.01  # what colours cover at least to either side of means that are all equal
+
+
 MARK = "#d55e00"  # colour that marks the best cell and cells that are not significantly worse
 
 
@@ -160,7 +163,8 @@ def draw_heat_map(
         best = leading["mean"].idxmin()
     else:
         best = leading["mean"].idxmax()
-    scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
+    least, most = _range_of_colours(rows["mean"], measure)
+    scale = {"vmin": least, "vmax": most, "cmap": "YlGnBu"}
     if measure.less_is_better:
         scale["cmap"] = "YlGnBu_r"
     height = 1.2 + (1.75 if facet else 0.5 * len(values[y])) * ceil(len(panels) / columns)
@@ -204,6 +208,22 @@ def draw_heat_map(
         caption += _DOTTED
     alt = f"{measure.name} of {policy} over {_fields_in_words(named)}"
     return Drawing(figure, alt, caption, data)
+
+
+def _range_of_colours(means: pd.Series, metric: Metric) -> tuple[float, float]:
+    """The means with the first and the last colour: of a share, no less than 0 and no more than 1.
+
+    Where all means are equal, a share of 1 has the last colour, and all others the middle one.
+    """
+    least = float(means.min())
+    most = float(means.max())
+    if least < most:
+        return least, most
+    around = max(abs(most) / 10, _LEAST_AROUND)
+    ends = np.array([least - around, most + around])
+    if metric.is_bounded:
+        ends = ends.clip(0.0, 1.0)
+    return float(ends[0]), float(ends[1])
 
 
 def draw_heat_maps(results: Results, metrics: Iterable[str]) -> Iterator[Drawing]:

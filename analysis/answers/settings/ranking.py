@@ -33,6 +33,7 @@ from dess.analysis.metrics import (
     Metric,
     check_ranking_metric,
     format_length,
+    metric_in_groups,
     metric_in_missions,
     metric_of,
     metrics_in,
@@ -249,7 +250,8 @@ def rank_settings(
         measure = metric_in_missions(missions, name)
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
-        ends = column_intervals(wide, measure, level_after(seen))
+        of_cells = metric_in_groups(missions, name, cell, table)
+        ends = column_intervals(wide, of_cells, level_after(seen))
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     # By the ranking metric, which was the last one.
     values = wide.to_numpy(float)
@@ -369,7 +371,8 @@ def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
         if measure.column != COST:
             cells[measure.head] = numbers.format_estimates(top, measure.column, measure.written)
     if prices := results.study.costs:
-        cells[COST] = [numbers.format_money(cost, prices.unit) for cost in top[COST]]
+        costs = numbers.format_estimates(top, COST, metric_of(COST).written)
+        cells[COST] = [f"{cost} {prices.unit}" for cost in costs]
     settings = f"{len(rows):,} settings"
     if len(rows) > MOST_PRINTED:
         settings += f", the first {MOST_PRINTED} are shown"

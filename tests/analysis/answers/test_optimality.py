@@ -34,16 +34,23 @@ def made():
 def test_the_interval_is_that_of_paired_differences(made):
     table = optimality.by_fleet(made).set_index(["uavs", "policy"])
     row = table.loc[1, "low"]
-    # Gaps 0.1, 0.2 and 0.3: mean 0.2, deviation 0.1, t of 2 degrees of freedom 4.3027.
-    half = 4.3027 * 0.1 / np.sqrt(3)
+    # Gaps 0.1, 0.2 and 0.3, with 0.96036 of 0 and of 1: mean 0.31710, squared deviations 0.60557,
+    # t of 3.92073 degrees of freedom 2.79872.
+    high = 0.31710 + 2.79872 * np.sqrt(0.60557 / 3.92073 / 4.92073)
     assert row[GAP] == pytest.approx(0.2)
-    assert row[f"{GAP}_low"] == pytest.approx(0.2 - half, abs=1e-5)
-    assert row[f"{GAP}_high"] == pytest.approx(0.2 + half, abs=1e-5)
+    assert row[f"{GAP}_low"] == 0
+    assert row[f"{GAP}_high"] == pytest.approx(high, abs=1e-4)
     assert (row["n"], row[BOUND]) == (3, pytest.approx(0.8))
     assert row[PRODUCT] == pytest.approx(row[BOUND] - row[GAP])
-    # The spread of the bounds and of the products, 0.1 each, is larger than that of the gaps here.
-    constant = table.loc[2, "low"]
-    assert constant[f"{GAP}_low"] == pytest.approx(constant[f"{GAP}_high"]) == pytest.approx(0.2)
+    # No failure moves the bound: 0.7, 0.8 and 0.9, t of 2 degrees of freedom 4.3027.
+    assert row[f"{BOUND}_low"] == pytest.approx(0.8 - 4.3027 * 0.1 / np.sqrt(3), abs=1e-4)
+
+
+def test_no_interval_has_what_cannot_be(made):
+    """A mean product is not above the mean bound, and no gap is below 0."""
+    table = optimality.by_fleet(made)
+    assert (table[f"{PRODUCT}_high"] <= table[f"{BOUND}_high"]).all()
+    assert (table[f"{GAP}_low"] >= 0).all()
 
 
 def test_rows_are_by_number_of_uavs_then_over_all(made):
@@ -61,5 +68,5 @@ def test_the_distance_to_the_bound_has_its_n_and_few_missions_tell_nothing(made,
     assert optimality.fleets_with_useful_bound(optimality.by_fleet(made)).empty
     monkeypatch.setattr(optimality, "LEAST", 3)
     said = optimality.in_words(made, "low")
-    assert said.startswith("`low` is at most 44.8 points with 1 UAV (mean gap 20.0 [−4.8, 44.8], n")
+    assert said.startswith("`low` is at most 81.3 points with 1 UAV (mean gap 20.0 [0.0, 81.3], n")
     assert "n = 3 missions) from the best possible. The upper bound is 100 % for 2 UAVs" in said

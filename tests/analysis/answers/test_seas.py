@@ -11,6 +11,7 @@ from dess.analysis.answers import seas
 from dess.analysis.answers.comparison import Cost, Times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import share_interval
 from tests.analysis.small import grid
 
 SEAS = ("scattered:2", "scattered:5", "coast:2", "dense:2")
@@ -37,6 +38,13 @@ def test_a_sea_counts_once(results):
     assert {*seas.means_over_seas(results, "nodes")["nodes"]} >= {"61 and more"}
     # Seed 2 has five or six.
     assert {*seas.means_over_seas(results, "uavs")["uavs"]} <= {5, 6}
+
+
+def test_a_share_of_seas_that_all_succeed_has_an_interval(results):
+    certain = replace(results, missions=results.missions.assign(success=1))
+    table = seas.means_over_seas(certain, metric=SUCCESS)
+    assert (table["mean"] == 1).all() and (table["high"] == 1).all()
+    assert table["low"].tolist() == [share_interval(4, 4).low] * 2
 
 
 def test_gains_and_shares_are_paired_by_sea(results):

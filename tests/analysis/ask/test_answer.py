@@ -14,7 +14,7 @@ from dess.analysis.answers import variation as found
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.variation import BASELINE, VARIATION
 from dess.analysis.metrics import PRODUCT, SUCCESS
-from dess.analysis.stats.differences import compare_pairs
+from dess.analysis.stats.differences import adjust_p_values, compare_pairs
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import (
     ABOVE,
@@ -98,6 +98,20 @@ def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(t
     assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
     failed = results.missions.query("point == @VARIATION")["failures"].mean()
     assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
+
+
+def test_what_is_called_adjusted_is_adjusted(answer):
+    for _, rows in found.compare_sides(answer.results).groupby("policy"):
+        known = rows[rows["p"].notna()]
+        expected = adjust_p_values(known["p"].to_numpy(), "holm")
+        assert known["p_adjusted"].tolist() == expected.tolist()
+
+
+def test_nobody_waits_where_there_is_a_pad_for_every_uav(tmp_path):
+    """No rare mission has a wait, so the interval of the difference has no length."""
+    answer = asked(tmp_path, 4, settings={"uavs": 3, "quota": 40}, policies=["greedy"])
+    answers = answer.table().set_index("metric")
+    assert answers.loc["waiting_per_uav", ["difference", "low", "high"]].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_mean_per_uav_is_that_over_the_uavs_of_the_mission(answer):

@@ -8,7 +8,8 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis.metrics import (
-    MOST_LOST,
+    LEAST_COST,
+    MOST_COST,
     MOST_SLOTS,
     PRODUCT,
     REWARD,
@@ -168,12 +169,14 @@ def test_points_are_compared_as_policies_are():
 
 
 def test_p_values_are_corrected_over_all_rows():
-    for correction in ("holm", "fdr", None):
+    for correction in ("holm", "fdr"):
         table = compared(metrics=[METRIC, "reward"], by=["point"], correction=correction)
         assert (
             table["p_adjusted"].tolist()
             == adjust_p_values(table["p"].to_numpy(), correction).tolist()
         )
+    # What is called adjusted is adjusted.
+    assert "p_adjusted" not in compared(correction=None)
 
 
 def test_missions_without_point_and_seed_are_paired_by_replication():
@@ -220,13 +223,13 @@ def test_equal_differences_of_bounded_values_have_an_interval_and_its_p_value(di
     # The way of an age to half of the horizon is the longest, that of a length to all of it.
     [("age", 40.0, MOST_SLOTS, 500, 210.0), ("slots", 40.0, MOST_SLOTS, 500, 460.0)]
     + [("age_h", 4.0, "most_slots_h", 50, 21.0), ("waiting_min", 60.0, "most_slots_h", 50, 2940.0)]
-    + [("cost", 40.0, MOST_LOST, 9000, 9000.0)],
+    + [("cost", 40.0, MOST_COST, 9000, 8960.0)],
 )
 def test_equal_values_do_not_rule_out_a_failure(metric, value, column, largest, change):
     """Both policies have the same value in all of 100 missions, and the interval has a length."""
     missions = pd.DataFrame(
         {"policy": np.repeat(["tour", "greedy"], 100), "replication": np.tile(range(100), 2)}
-    ).assign(**{metric: value, column: largest})
+    ).assign(**{metric: value, LEAST_COST: 30.0, column: largest})
     expected = stats.ttest_1samp([0.0] * 100 + [change, -change], 0).confidence_interval()
     row = compare(missions, "tour", [metric]).iloc[0]
     assert row[["difference", "p"]].tolist() == [0.0, 1.0]

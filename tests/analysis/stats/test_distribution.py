@@ -55,12 +55,24 @@ def test_distribution_has_a_row_per_group_and_view():
 
 def test_the_worst_are_at_the_end_that_is_asked_for():
     missions = pd.DataFrame({"slots": np.random.default_rng(3).exponential(size=500)})
-    lowest = spread(missions.assign(slots=-missions), "slots", by=[]).iloc[-1]
+    mirrored = missions.assign(slots=-missions)
+    lowest = spread(mirrored, "slots", by=[], worst="lowest").iloc[-1]
     highest = spread(missions, "slots", by=[], worst="highest").iloc[-1]
     assert highest["value"] > missions["slots"].quantile(0.95)
     ends = [-lowest["value"], -lowest["high"], -lowest["low"]]
     # quantiles of 99 resamples are mirrored up to the rounding of BCa's levels
     assert highest[["value", "low", "high"]].tolist() == pytest.approx(ends)
+    assert spread(missions, "slots", by=[]).iloc[-1].equals(highest)  # more slots are worse
+
+
+def test_missions_that_have_measured_nothing_are_left_out():
+    """No UAV has asked for a pad in them, so they are no missions without a wait."""
+    waits = pd.DataFrame(
+        {"policy": ["tour"] * 5 + ["greedy"], "waiting": [3.0, 1, 5, *[np.nan] * 3]}
+    )
+    table = spread(waits, "waiting", quantiles=[0.5])
+    assert table["policy"].tolist() == ["tour"] * 2
+    assert table["value"].tolist() == [3.0, 5.0] and set(table["n"]) == {3}
 
 
 def test_the_interval_of_the_worst_is_wider_than_that_of_its_bootstrap():

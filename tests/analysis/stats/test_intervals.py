@@ -50,7 +50,9 @@ def test_it_has_a_length_holds_the_mean_and_ends_where_shares_do(values, level):
     [(SUCCESS, share_interval(7, 8)), (RATIO, bounded_interval([1.0] * 7 + [0.0]))]
     # Hall's slope is -2.82843 / (3 sqrt(8)) = -1 / 3, t(0.975, 7) = 2.36462: the cube roots are
     # those of 1 - (2.36462 + 1 / 6) and 1 - (-2.36462 + 1 / 6), and s / sqrt(8) is 0.125
-    + [(REWARD, (0.875, 0.875 - 0.125 * 6.45786, 0.875 + 0.125 * 1.41990))],
+    + [("speed", (0.875, 0.875 - 0.125 * 6.45786, 0.875 + 0.125 * 1.41990))]
+    # A failure costs 400: 2.26520 sqrt((0.875 + 2 * 0.96036 * 400^2) / 8.92073 / 9.92073)
+    + [(REWARD, (0.875, 0.875 - 133.48519, 0.875 + 133.48519))],
 )
 def test_every_metric_has_the_interval_that_is_fit_for_it(metric, expected):
     values = pd.DataFrame({"a": [1.0] * 7 + [0.0], "b": np.nan})
@@ -70,7 +72,7 @@ def at_points(generator: np.random.Generator, replications: int, common: float =
     return np.array([0.5, 0.7, 0.9]) + (1 - common) * own + common * shared
 
 
-@pytest.mark.parametrize("metric", [PRODUCT, REWARD])
+@pytest.mark.parametrize("metric", [PRODUCT, REWARD, "speed"])
 def test_a_single_point_is_a_plain_sample(metric):
     values = np.random.default_rng(3).beta(8, 2, (40, 1))
     assert stratified_interval(values, metric) == interval_of(metric, values[:, 0])
@@ -80,7 +82,8 @@ def test_points_that_share_all_chance_count_as_one():
     one = np.random.default_rng(4).beta(8, 2, (40, 1))
     alike = np.repeat(one, 5, axis=1)
     assert stratified_interval(alike, PRODUCT) == pytest.approx(bounded_interval(one[:, 0]))
-    assert stratified_interval(alike, REWARD) == pytest.approx(interval_of(REWARD, one[:, 0]))
+    for metric in (REWARD, "speed"):
+        assert stratified_interval(alike, metric) == pytest.approx(interval_of(metric, one[:, 0]))
     # Failures, none of which is seen, may hit all points at once.
     certain = np.ones((40, 5))
     assert stratified_interval(certain, SUCCESS) == pytest.approx(bounded_interval(np.ones(40)))
@@ -110,13 +113,13 @@ def test_a_summary_over_points_is_stratified_and_one_over_a_sample_of_points_is_
 
 def test_an_interval_over_strata_is_that_of_the_means_of_the_replications():
     values = at_points(np.random.default_rng(8), 25, common=0.5)
-    expected = interval_of(REWARD, values.mean(axis=1))
-    assert stratified_interval(values, REWARD) == pytest.approx(expected)
+    expected = interval_of("speed", values.mean(axis=1))
+    assert tuple(stratified_interval(values, "speed")) == pytest.approx(tuple(expected))
 
 
 def test_without_skewness_the_interval_is_students():
     values = np.array([1.0, 2.0, 3.0, 5.0, 7.0, 8.0, 9.0])
-    assert interval_of(REWARD, values) == mean_interval(values)
+    assert interval_of("speed", values) == pytest.approx(mean_interval(values), rel=1e-12)
     assert interval_of("cost", 1e6 + 1e-3 * values) == pytest.approx(
         mean_interval(1e6 + 1e-3 * values)
     )
@@ -185,7 +188,7 @@ def test_summary_has_a_row_per_group_and_metric():
     rows = table.set_index(["policy", "metric"])
     ends = ["mean", "low", "high"]
     assert tuple(rows.loc[("tour", "success"), ends]) == share_interval(2, 3)
-    assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
+    assert tuple(rows.loc[("tour", "reward"), ends]) == interval_of(REWARD, [1.0, 2.0, 3.0])
     assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == bounded_interval([0.5, 0.5])
     assert rows.loc["tour", "n"].tolist() == [3] * 4
 

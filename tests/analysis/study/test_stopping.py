@@ -88,13 +88,14 @@ def test_a_mean_of_zero_meets_no_relative_target():
     row = reached(relative, reward=[1.0, -1.0] * 300)
     assert (row.missions, row.stop, row.met, row.target) == (400, None, False, 0.0)
     # Certain, as far as it shows.
-    assert reached(relative, reward=[0.0] * 300).missions == 2
+    relative = rule(budget=400, targets={"queue": {"relative": 0.5}})
+    assert reached(relative, queue=[0.0] * 300).missions == 2
 
 
 def test_where_the_budget_ends_it_says_what_was_missed():
     generator = np.random.default_rng(5)
     data = {"success": generator.random(900) < 0.5, "reward": generator.normal(size=900)}
-    targets = {"success": {"absolute": 0.01}, "reward": {"absolute": 0.5}}
+    targets = {"success": {"absolute": 0.01}, "reward": {"absolute": 8.0}}
     narrow = rule(first=30, look_ahead=10, budget=200, targets=targets)
     success, reward = narrow.reached(finished(narrow, data))
     assert success.missions == reward.missions == narrow.budget

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from dess import InputError, load_scenario, policies
+from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm import entry, image
@@ -175,6 +176,34 @@ def test_intervals_of_means_and_differences_are_the_confidence_sequences():
         add_values(sequence, values[:, ratio].copy())
         assert tuple(engine.read("ends")[ratio]) == sequence_ends(sequence)
         assert (engine.read("ends")[ratio] != [least, 1.0]).any()
+
+
+def test_the_interval_of_costs_allows_for_losses_at_the_prices_of_the_reader():
+    """The fleet is bought anyway; at the most, all UAVs are lost, and the mission takes longest."""
+    space = load_scenario("paper", uavs=[1, 2], max_slots=300)
+    costs = Costs(uav=100.0, pad=10.0, missions=50, slot_seconds=12.0)
+    engine = Engine(image.make_image(space, ["greedy"], 7, 60, costs=costs))
+    prices = dict(zip(entry.PRICES, engine.read("prices"), strict=True))
+    prices |= {"lost_uav": 900.0, "hour": 6.0}
+    engine.write("prices", np.array([*prices.values()]))
+    engine.call("play", 0.0, 60)
+    engine.call("measure", 60)
+    engine.call("begin", 0)
+    engine.call("add", 60)
+    cost = entry.METRICS.index("cost")
+    failure = 50 * (2 * 900.0 + 6.0 * 300 * 12 / 3600)
+    assert engine.read("bounds")[cost].tolist() == [
+        100.0 + 10.0 * space.charging_pads,
+        np.inf,
+        failure,
+        1 - LEVEL,
+    ]
+    sequence = new_sequence(engine.read("bounds")[cost, 0], np.inf, 1 - LEVEL, failure)
+    add_values(sequence, engine.read("values")[:, cost].copy())
+    assert tuple(engine.read("ends")[cost]) == sequence_ends(sequence)
+    engine.write("bounds", engine.read("bounds"))
+    engine.call("begin", 1)  # of differences, with the bounds that the caller has written
+    assert engine.read("sequences")[cost]["failure"] == failure
 
 
 def _sum(values: list[float]) -> float:

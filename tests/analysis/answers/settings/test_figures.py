@@ -69,6 +69,15 @@ def test_a_heat_map_frames_what_may_be_the_best_and_marks_the_best(results, face
     assert sorted(texts) == sorted(f"{100 * mean:.1f}" for mean in table["mean"])
 
 
+def test_the_colours_of_shares_end_at_100_percent_and_the_numbers_are_readable(results):
+    certain = replace(results, missions=results.missions.assign(success=1))
+    figure = draw_heat_map(certain, "quota", "initial_data", "success", "random").figure
+    bar = next(ax for ax in figure.axes if ax.get_label() == "<colorbar>")
+    assert bar.get_ylim() == (0.9, 1.0)
+    # White on the darkest blue.
+    assert {text.get_color() for text in figure.axes[0].texts} == {"white"}
+
+
 def test_of_costs_the_lowest_cell_is_marked(results):
     missions = results.missions
     priced = replace(results, missions=missions.assign(cost=1e4 * missions["uavs"]))

@@ -149,7 +149,9 @@ class _Auditor:
             found |= {"failures": self.failures.of_uavs, "slots_grounded": grounded}
         if "charging" in self.c:
             waited, requests = self._sum("slots_waiting"), self.pads.requests
-            found |= {"queue": waited / slots, "waiting": waited / max(requests, 1)}
+            found["queue"] = waited / slots
+            if requests:
+                found["waiting"] = waited / requests
             found["pad_requests"] = requests
             found["utilisation"] = self._sum("slots_charging") / (self.pads.number * slots)
         return found
