@@ -39,6 +39,8 @@ class Metric:
             known either. Of a cost, ``metric_in_missions`` finds it.
         grows: Whether it grows with the length of the mission, so that only missions of the same
             length are to be compared by it.
+        among: Of how many nodes it is that of the worst one; 1 if it is not of a node. Intervals
+            and tests hold for so many at once (``level_of_each``).
     """
 
     column: str
@@ -53,6 +55,15 @@ class Metric:
     most: float = inf
     failure: float = 0.0
     grows: bool = False
+    among: int = 1
+
+    def level_of_each(self, level: Any) -> Any:
+        """The level of the interval of each node so that those of all hold together at a level.
+
+        Without it, the interval of the node that did worst by chance would miss the mean of the
+        worst node too often (Bonferroni's bound).
+        """
+        return 1 - (1 - level) / self.among
 
     @property
     def range(self) -> tuple[float, float]:
@@ -65,6 +76,14 @@ class Metric:
     def has_range(self) -> bool:
         """Whether both ends of the range are known."""
         return bool(isfinite(self.range[0]) and isfinite(self.range[1]))
+
+    @property
+    def allows_for_ends(self) -> bool:
+        """Whether the interval of its mean allows for values at both ends that none has shown.
+
+        Shares have such, and an age of the worst node, which is often that of no visit at all.
+        """
+        return self.is_bounded or (self.among > 1 and self.has_range)
 
     def lasting(self, horizon: float) -> "Metric":
         """The metric of missions that may last a time, in its unit; a time has a range then."""
@@ -161,6 +180,7 @@ FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].defa
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
+LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
@@ -225,6 +245,10 @@ _MEASURED = (
     _time_metric(AGE, "Age of information", horizons=0.5, grows=True),
     _time_metric("peak_age", "Peak age of information", grows=True),
     _time_metric("age_p99", "99th percentile of the age", grows=True),
+    # Of the node whose mean over the missions is the worst; each mission has the value of this
+    # node. They follow from ``NODES_BEHIND``, not from a record.
+    Metric(LEAST, "Collection ratio of the worst node", kind="share", in_percent=True),
+    _time_metric(OLDEST, "Age of the oldest node", horizons=0.5, grows=True),
     _time_metric("latency", "Latency"),
     _time_metric("latency_p99", "99th percentile of the latency"),
     _amount_metric("generated", "Packets generated"),
@@ -254,6 +278,13 @@ _IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in _ALL}
 _KNOWN = {metric.column: metric for metric in _ALL}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
 
+# The columns of the values of all nodes of a mission, of which a metric has those of the worst one.
+NODE_RATIOS, NODE_AGES = "node_ratios", "node_ages"
+NODES_BEHIND = {
+    LEAST: NODE_RATIOS,
+    OLDEST: NODE_AGES,
+    _IN_SHEET_UNIT[OLDEST]: f"{NODE_AGES}_{_KNOWN[OLDEST].sheet_unit}",
+}
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
 # As they are measured, and in the units of data sheets.
@@ -291,6 +322,14 @@ def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
     )
 
 
+def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
+    """The metric of a column of missions of a scenario space, with its range and its nodes."""
+    metric = metric_for_length(column, space.max_slots, space.units)
+    if column in NODES_BEHIND:
+        return replace(metric, among=len(space.nodes))
+    return metric
+
+
 def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
@@ -300,6 +339,9 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
         column: The column.
     """
     metric = metric_of(column)
+    nodes = NODES_BEHIND.get(column)
+    if nodes in missions and len(missions):
+        metric = replace(metric, among=len(missions[nodes].iloc[0]))
     if metric.kind == "cost" and MOST_LOST in missions:
         return replace(metric, failure=float(missions[MOST_LOST].max()))
     longest = metric_of(MOST_SLOTS)
@@ -334,7 +376,13 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
         units: What a slot and a data unit are, numbers or an array of one for each mission.
     """
     metrics = [m for m in _ALL if m.sheet_unit and m.column in missions]
-    return {m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics}
+    columns = {
+        m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics
+    }
+    if NODE_AGES in missions:
+        oldest = metric_of(OLDEST).in_units
+        columns[NODES_BEHIND[oldest.column]] = missions[NODE_AGES] * size_of(oldest.unit, units)
+    return columns
 
 
 def size_of(unit: str, units: Units) -> float:
@@ -401,4 +449,5 @@ def ranking_column(metric: str, missions: Container[str]) -> str:
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
     """The metrics of the missions of a scenario, as they are measured."""
-    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space)])
+    of_nodes = [LEAST, OLDEST] if space.units else []
+    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space), *of_nodes])

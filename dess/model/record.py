@@ -117,6 +117,17 @@ def nodes_of(records: np.ndarray) -> np.ndarray:
     return records[~np.isnan(records["initial"])]
 
 
+def node_ratios(records: np.ndarray) -> np.ndarray:
+    """The collection ratio of every node, of an array of ``NODE_RECORD``; without any data it is 1.
+
+    As in ``MISSION_RECORD``, rounding does not put it below 0 or above 1.
+    """
+    total = records["initial"] + records["arrived"]
+    ratios = np.ones(records.shape)
+    np.divide(records["collected"], total, out=ratios, where=total != 0)
+    return np.clip(ratios, 0.0, 1.0)
+
+
 @kernel
 def write_records(places, state, ways, records):
     """Write the records of the missions at these (N,) places of the state.
