@@ -322,6 +322,11 @@ def metric_for_length(column: str, slots: int, units: Units | None) -> Metric:
     )
 
 
+def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
+    """A table of missions without the columns that have a list for every mission."""
+    return missions.drop(columns=[*NODES_BEHIND.values()], errors="ignore")
+
+
 def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
     """The metric of a column of missions of a scenario space, with its range and its nodes."""
     metric = metric_for_length(column, space.max_slots, space.units)

@@ -6,7 +6,7 @@ intervals; statistics that have no formula are bootstrapped.
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from functools import reduce
+from functools import partial, reduce
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -560,34 +560,39 @@ def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) ->
         metric: The metric.
         spaces: The columns that tell the spaces apart, such as ``point``.
     """
-    values = missions[metric].to_numpy(float).copy()
-    fleets = missions["uavs"].to_numpy() if "uavs" in missions else None
-    nodes = NODES_BEHIND.get(metric)
-    if fleets is None and nodes not in missions:
-        return values
+    if NODES_BEHIND.get(metric) in missions:
+        values = np.empty(len(missions))
+        adjust = partial(_values_of_worst_node, missions, metric)
+    else:
+        values = missions[metric].to_numpy(float).copy()
+        if "uavs" not in missions:
+            return values
+        fleets = missions["uavs"].to_numpy()
+
+        def adjust(rows: np.ndarray) -> np.ndarray:
+            return post_stratified(values[rows], fleets[rows])
+
     table = missions[[*spaces]].reset_index(drop=True)
     for _, part in group_rows(table, spaces):
         rows = part.index.to_numpy()
-        if nodes in missions:
-            values[rows] = _values_of_worst_node(missions.iloc[rows], metric)
-        elif fleets is not None:
-            values[rows] = post_stratified(values[rows], fleets[rows])
+        values[rows] = adjust(rows)
     return values
 
 
-def _values_of_worst_node(missions: pd.DataFrame, metric: str) -> np.ndarray:
-    """The linearised values of ``worst_of_nodes``, of missions of one scenario space.
+def _values_of_worst_node(missions: pd.DataFrame, metric: str, rows: np.ndarray) -> np.ndarray:
+    """The linearised values of ``worst_of_nodes``, of rows of missions of one scenario space.
 
     Those of scenarios with different numbers of nodes are the values of the worst node of each.
     """
-    of_missions = missions[NODES_BEHIND[metric]].to_numpy()
+    of_space = missions.iloc[rows]
+    of_missions = of_space[NODES_BEHIND[metric]].to_numpy()
     if len({len(nodes) for nodes in of_missions}) > 1:
-        return missions[metric].to_numpy(float)
+        return of_space[metric].to_numpy(float)
     by_node = np.stack(of_missions)
-    if "uavs" in missions and missions["uavs"].nunique() > 1:
-        fleets = missions["uavs"].to_numpy()
+    if "uavs" in of_space and of_space["uavs"].nunique() > 1:
+        fleets = of_space["uavs"].to_numpy()
         by_node = np.apply_along_axis(post_stratified, 0, by_node, fleets)
-    return worst_of_nodes(by_node, metric_in_missions(missions, metric))
+    return worst_of_nodes(by_node, metric_in_missions(of_space, metric))
 
 
 def worst_node(means: np.ndarray, metric: str | Metric) -> int:

@@ -228,9 +228,7 @@ def _write_nodes(mission, residual, sensors, nodes, row):
         out.age, out.age_at_end = age_of_node(mission, sensor)
 
 
-def empty_records(
-    missions: int, uavs: int, is_extended: bool = False, nodes: int = 0
-) -> Records:
+def empty_records(missions: int, uavs: int, is_extended: bool = False, nodes: int = 0) -> Records:
     """Zeroed records of that many missions and UAVs per mission; ``operations`` are nan.
 
     With ``nodes`` there is also room for the records of so many nodes, which are nan.

@@ -14,6 +14,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.settings.home import way_home_sentence_of, with_way_home
+from dess.analysis.answers.settings.nodes import hardly_served_clause
 from dess.analysis.answers.settings.points import (
     ends_of_point,
     ends_sentence,
@@ -132,8 +133,9 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
             f"Of the {others:,} others, {many:,} may be as good{named}; the rest are "
             "significantly worse."
         )
+    hardly = hardly_served_clause(results, best["policy"], [best["point"]])
     parts = [
-        f"The best {what} is {names[0]}: {measure.within} {value}, n = {best['n']:,}.",
+        f"The best {what} is {names[0]}: {measure.within} {value}, n = {best['n']:,}{hardly}.",
         rest,
         ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
         way_home_sentence_of(results, best, metric),

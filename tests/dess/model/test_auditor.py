@@ -12,8 +12,8 @@ from dess.model.mission import simulate
 from dess.model.record import MISSION_RECORD, NODE_RECORD, measures_of
 from dess.physics.fleet import UavType
 from dess.physics.section import Section
-from dess.scenario.data_sheet import DataSheet
 from dess.policies import load
+from dess.scenario.data_sheet import DataSheet
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.model.auditor import audit
 from tests.drawn import (
