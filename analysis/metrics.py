@@ -45,6 +45,8 @@ class Metric:
         fails: Whether a failure may move it to an end of its range.
         grows: Whether it grows with the length of the mission, so that only missions of the same
             length are to be compared by it.
+        among: Of how many nodes it is that of the worst one; 1 if it is not of a node. Intervals
+            and tests hold for so many at once (``level_of_each``).
     """
 
     column: str
@@ -61,6 +63,15 @@ class Metric:
     failure: float = 0.0
     fails: bool = True
     grows: bool = False
+    among: int = 1
+
+    def level_of_each(self, level: Any) -> Any:
+        """The level of the interval of each node so that those of all hold together at a level.
+
+        Without it, the interval of the node that did worst by chance would miss the mean of the
+        worst node too often (Bonferroni's bound).
+        """
+        return 1 - (1 - level) / self.among
 
     @property
     def range(self) -> tuple[Any, Any]:
@@ -173,6 +184,7 @@ FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].defa
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
+LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
@@ -256,6 +268,10 @@ _MEASURED = (
     _time_metric(AGE, "Age of information", horizons=0.5, grows=True),
     _time_metric("peak_age", "Peak age of information", grows=True),
     _time_metric("age_p99", "99th percentile of the age", grows=True),
+    # Of the node whose mean over the missions is the worst; each mission has the value of this
+    # node. They follow from ``NODES_BEHIND``, not from a record.
+    Metric(LEAST, "Collection ratio of the worst node", kind="share", in_percent=True),
+    _time_metric(OLDEST, "Age of the oldest node", horizons=0.5, grows=True),
     _time_metric("latency", "Latency"),
     _time_metric("latency_p99", "99th percentile of the latency"),
     _amount_metric("generated", "Packets generated"),
@@ -292,6 +308,13 @@ _DATA_KEPT = {column: (COLLECTED, "residual") for column in (COLLECTED, "residua
 _DATA_KEPT |= {
     _IN_SHEET_UNIT[column]: tuple(_IN_SHEET_UNIT[part] for part in parts)
     for column, parts in _DATA_KEPT.items()
+}
+# The columns of the values of all nodes of a mission, of which a metric has those of the worst one.
+NODE_RATIOS, NODE_AGES = "node_ratios", "node_ages"
+NODES_BEHIND = {
+    LEAST: NODE_RATIOS,
+    OLDEST: NODE_AGES,
+    _IN_SHEET_UNIT[OLDEST]: f"{NODE_AGES}_{_KNOWN[OLDEST].sheet_unit}",
 }
 METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
 MEASURES = {metric.column: metric for metric in _MEASURED}
@@ -336,6 +359,19 @@ def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 
     return replace(metric, most=longest)
 
 
+def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
+    """A table of missions without the columns that have a list for every mission."""
+    return missions.drop(columns=[*NODES_BEHIND.values()], errors="ignore")
+
+
+def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
+    """The metric of a column of missions of a scenario space, with its range and its nodes."""
+    metric = metric_for_length(column, space.max_slots, space.units, space.uavs[1])
+    if column in NODES_BEHIND:
+        return replace(metric, among=len(space.nodes))
+    return metric
+
+
 def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     """The metric of a column of missions, with the range that it has in these missions.
 
@@ -347,6 +383,9 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     metric = metric_of(column)
     if not len(missions):
         return metric
+    nodes = NODES_BEHIND.get(column)
+    if nodes in missions:
+        metric = replace(metric, among=len(missions[nodes].iloc[0]))
     least, most = ranges_of_missions(missions, column)
     return replace(metric, least=float(np.min(least)), most=float(np.max(most)))
 
@@ -442,7 +481,13 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
         units: What a slot and a data unit are, numbers or an array of one for each mission.
     """
     metrics = [m for m in _ALL if m.sheet_unit and m.column in missions]
-    return {m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics}
+    columns = {
+        m.in_units.column: missions[m.column] * size_of(m.sheet_unit, units) for m in metrics
+    }
+    if NODE_AGES in missions:
+        oldest = metric_of(OLDEST).in_units
+        columns[NODES_BEHIND[oldest.column]] = missions[NODE_AGES] * size_of(oldest.unit, units)
+    return columns
 
 
 def size_of(unit: str, units: Units) -> float:
@@ -518,4 +563,5 @@ def longest_wait(space: ScenarioSpace) -> int:
 
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
     """The metrics of the missions of a scenario, as they are measured."""
-    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space)])
+    of_nodes = [LEAST, OLDEST] if space.units else []
+    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space), *of_nodes])

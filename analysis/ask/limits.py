@@ -21,7 +21,9 @@ from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.ask.around import place_beside
 from dess.analysis.metrics import columns_in_units, metric_of
+from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.intervals import values_within
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
 from dess.base.files.writing import write_file
@@ -312,6 +314,7 @@ class _Fleet:
             progress=self._progress,
         )
         table = pd.DataFrame(records.missions).join(pd.DataFrame(records.operations))
+        table = table.assign(**columns_of_nodes(records))
         broken = [SHEET] * len(changes)
         for place, (number, space) in enumerate(spaces.items()):
             rows = table[place * self.missions :][: self.missions]
@@ -329,8 +332,11 @@ class _Fleet:
         room = {}
         for requirement in self._requirements:
             column = requirement.column
-            same = self.checks[column][: len(missions)].mean()
-            mean = self.checks[column].mean() + missions[column].mean() - same
+            whole, same, changed = (
+                values_within(rows, column, ()).mean()
+                for rows in (self.checks, self.checks[: len(missions)], missions)
+            )
+            mean = whole + changed - same
             room[column] = float(requirement.margin(mean)) / abs(requirement.bound)
         worst = min(room, key=room.__getitem__)
         if room[worst] >= 0:

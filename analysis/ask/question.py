@@ -13,7 +13,7 @@ import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import tomli_w
@@ -25,12 +25,12 @@ from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
-from dess.analysis.metrics import AGE, ALIASES, METRICS, column_in_sheet_unit
+from dess.analysis.metrics import AGE, ALIASES, LEAST, METRICS, OLDEST, column_in_sheet_unit
 from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
-from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.cheapest import Cheapest, Required
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
@@ -285,8 +285,8 @@ def _cheapest_rule(
     least = {}
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)
-        if full not in (*METRICS, AGE):
-            names = [*METRICS, *ALIASES, AGE]
+        if full not in get_args(Required):
+            names = [*METRICS, *ALIASES, AGE, LEAST, OLDEST]
             raise unknown_name("requirements", f"{metric!r} is unknown", metric, names)
         least[full] = share
     spaces = study.scenarios
@@ -308,7 +308,7 @@ def _cheapest_rule(
     }
     try:
         cheapest_rule = Cheapest.model_validate(rule)
-        cheapest_rule.check_age(spaces)
+        cheapest_rule.check_requirements(spaces)
         return cheapest_rule
     except ValidationError as error:
         raise to_input_error(error, "sweep: selection: cheapest", Cheapest) from None

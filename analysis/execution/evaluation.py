@@ -1,5 +1,6 @@
 """Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from math import nan
@@ -7,6 +8,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from dess import InputError, simulate_batch
 from dess.analysis import numbers
@@ -20,13 +22,20 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import RECORDED, columns_in_units, measured_in
+from dess.analysis.metrics import (
+    NODES_BEHIND,
+    RECORDED,
+    columns_in_units,
+    measured_in,
+    metric_in_space,
+)
 from dess.analysis.results.chunks import split_into_chunks
 from dess.analysis.results.manifest import Cell, Part
+from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import Moments
 from dess.base.errors import check_type
-from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import check_seed, spaces_of
 from dess.model.view import check_team
 from dess.physics.streams import MAX_REPLICATION
@@ -36,7 +45,9 @@ from dess.scenario.scenario import AnyScenario, ScenarioSpace
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
 MEMORY = 2**24
-ByFleet = dict[str, dict[int, Moments]]  # by metric and number of UAVs
+# By metric, or the metric and a node, and by number of UAVs.
+Key = str | tuple[str, int]
+ByFleet = dict[Key, dict[int, Moments]]
 
 
 class Asked(NamedTuple):
@@ -166,19 +177,20 @@ def of_results(results: Results) -> list[Evaluation]:
     """The evaluations of the teams of a study that has the scenario as its only design point."""
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
-        metrics = {name: rows[name].to_numpy(float) for name in RECORDED}
+        metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in RECORDED}
         measured = [name for name in OPERATIONS.names or () if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
-            metrics[name] = rows[name].to_numpy(float)
+            if name not in NODES_BEHIND:
+                metrics[name] = rows[name].to_numpy(float)
         moments: ByFleet = {}
-        _add_to_moments(moments, metrics, rows["uavs"].to_numpy())
+        _add_to_moments(moments, metrics | _values_by_node(rows), rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))
         evaluations.append(Evaluation(str(team), over_space, int(rows["uav_slots"].sum()), nan))
     return evaluations
 
 
 def _add_to_moments(
-    moments: ByFleet, metrics: Mapping[str, np.ndarray], fleets: np.ndarray
+    moments: ByFleet, metrics: Mapping[Key, np.ndarray], fleets: np.ndarray
 ) -> None:
     """Add the metrics of missions, by the number of UAVs of each; those without a value are not."""
     for metric, values in metrics.items():
@@ -192,23 +204,43 @@ def _add_to_moments(
 
 
 def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[str, Moments]:
+    """The moments of every metric over the space; of nodes those of the worst one."""
     fleets = range(space.uavs[0], space.uavs[1] + 1)
-    return {
-        m: Moments.of_space([by_fleet.get(n) for n in fleets], missions)
-        for m, by_fleet in moments.items()
-    }
+    over_space: dict[str, Moments] = {}
+    by_node: dict[str, list[Moments]] = defaultdict(list)
+    for key, by_fleet in moments.items():
+        whole = Moments.of_space([by_fleet.get(n) for n in fleets], missions)
+        if isinstance(key, str):
+            over_space[key] = whole
+        else:
+            by_node[key[0]].append(whole)
+    for metric, nodes in by_node.items():
+        over_space[metric] = Moments.of_worst_node(nodes, metric_in_space(metric, space))
+    return over_space
 
 
-def _metric_values(records: Records, space: ScenarioSpace) -> dict[str, np.ndarray]:
+def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarray]:
     """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in RECORDED}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     if space.units:
         values |= columns_in_units(values, space.units)
-    else:
-        values |= {}
-    return {metric: column.astype(float) for metric, column in values.items()}
+    metrics: dict[Key, np.ndarray] = {m: column.astype(float) for m, column in values.items()}
+    if not space.units:
+        return metrics
+    nodes = pd.DataFrame(columns_of_nodes(records))
+    return metrics | _values_by_node(nodes.assign(**columns_in_units(nodes, space.units)))
+
+
+def _values_by_node(missions: pd.DataFrame) -> dict[Key, np.ndarray]:
+    """The values of every node, of the metrics of the worst one that missions have."""
+    values: dict[Key, np.ndarray] = {}
+    for metric, nodes in NODES_BEHIND.items():
+        if nodes in missions:
+            by_node = np.stack(missions[nodes].to_numpy())
+            values |= {(metric, node): of_node for node, of_node in enumerate(by_node.T)}
+    return values
 
 
 def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
@@ -246,6 +278,8 @@ def _missions_at_once(scenario: ScenarioSpace) -> int:
     memory_of_mission = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
     if scenario.is_extended:
         memory_of_mission += OPERATIONS.itemsize
+    if scenario.units:
+        memory_of_mission += len(scenario.nodes) * NODE_RECORD.itemsize
     return 2 ** ((MEMORY // memory_of_mission).bit_length() - 1)
 
 

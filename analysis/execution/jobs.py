@@ -16,7 +16,7 @@ from dess.analysis.results.chunks import Chunk
 from dess.analysis.results.manifest import Cell, Part
 from dess.analysis.results.provenance import Member, bound_code, members_of
 from dess.analysis.results.store import Store
-from dess.model.record import Records, empty_records
+from dess.model.record import Records, empty_records_of
 from dess.policies.registry import load_team
 from dess.scenario.scenario import ScenarioSpace
 
@@ -49,8 +49,7 @@ def simulate_missions(
     if engine == "batch":
         fleet = max(space.uavs[1] for space in spaces)
         return simulate_batch(spaces, team[:fleet], seed, replications, progress=progress)
-    is_extended = any(space.is_extended for space in spaces)
-    records = empty_records(len(spaces), max(space.uavs[1] for space in spaces), is_extended)
+    records = empty_records_of(spaces, len(spaces))
     for row, (space, replication) in enumerate(zip(spaces, replications, strict=True)):
         records.add(row, simulate(space, team[: space.uavs[1]], seed, replication))
         if progress:

@@ -21,13 +21,20 @@ import pyarrow.parquet as pq
 from pydantic import Field, TypeAdapter
 
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import ADDED
+from dess.analysis.metrics import ADDED, NODE_AGES, NODE_RATIOS
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT, parquet_of
 from dess.base.files.writing import write_file
 from dess.model.events import EVENT_COLUMNS, EVENT_NAMES
-from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.model.record import (
+    MISSION_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    Records,
+    node_ratios,
+    nodes_of,
+)
 from dess.model.state import END_NAMES
 from dess.physics.streams import MAX_REPLICATION
 from dess.scenario.fields import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
@@ -53,6 +60,11 @@ def _record_columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
 MISSIONS = pa.schema([("cell", KEY), *_record_columns(MISSION_RECORD)])
 # With what extended scenarios measure; nan where a mission lacks it.
 EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_record_columns(OPERATIONS)])
+# With the ratio and the age of every node [slots], where scenarios have a data sheet.
+NODES = (NODE_RATIOS, NODE_AGES)
+SHEET_MISSIONS = pa.schema(
+    [*EXTENDED_MISSIONS, *((name, pa.list_(pa.float64())) for name in NODES)]
+)
 UAVS = pa.schema(
     [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_record_columns(UAV_RECORD)]
 )
@@ -92,7 +104,7 @@ def _with_earlier(schema: pa.Schema, added: Iterable[Sequence[str]]) -> list[pa.
 _OF_MISSIONS = (_with_earlier(kind, _ADDED_TO_MISSIONS) for kind in (MISSIONS, EXTENDED_MISSIONS))
 # The schemas that files may have.
 SCHEMAS = {
-    "missions": [*chain(*zip(*_OF_MISSIONS, strict=True))],
+    "missions": [SHEET_MISSIONS, *chain(*zip(*_OF_MISSIONS, strict=True))],
     "uavs": _with_earlier(UAVS, _ADDED_TO_UAVS),
     "bounds": [BOUNDS],
     "events": _with_earlier(EVENTS, _ADDED_TO_EVENTS),
@@ -118,6 +130,8 @@ def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     if len(records.operations):
         missions |= {n: records.operations[n] for n in OPERATIONS.names or ()}
+    if len(records.nodes):
+        missions |= columns_of_nodes(records)
     present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
     mission, uav = np.nonzero(present)
     uavs = {
@@ -130,12 +144,23 @@ def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
     return tables_with(chunk, missions, uavs)
 
 
+def columns_of_nodes(records: Records) -> dict[str, Any]:
+    """What is kept of the nodes of missions with a data sheet: for each mission (K,) values."""
+    nodes = [nodes_of(row) for row in records.nodes]
+    return {
+        NODE_RATIOS: [node_ratios(of_mission) for of_mission in nodes],
+        NODE_AGES: [of_mission["age"] for of_mission in nodes],
+    }
+
+
 def tables_with(
     chunk: Chunk, missions: Mapping[str, Any], uavs: Mapping[str, Any]
 ) -> list[pa.Table]:
     """The tables of a chunk from their columns, such as those of ``rows_of``."""
     is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
-    if is_extended:
+    if all(name in missions for name in NODES):
+        schema = SHEET_MISSIONS
+    elif is_extended:
         schema = EXTENDED_MISSIONS
     else:
         schema = MISSIONS
@@ -285,6 +310,11 @@ def _are_valid(table: pa.Table) -> bool:
             values = column.to_numpy()
             if not ((values >= low) & (values <= high)).all():
                 return False
+    for name in (name for name in NODES if name in table.column_names):
+        counts = pc.list_value_length(table[name]).to_numpy()
+        values = pc.list_flatten(table[name]).to_numpy()
+        if not ((counts > 0) & (counts <= MOST_NODES)).all() or not np.isfinite(values).all():
+            return False
     if "cuts" in table.column_names:  # there are prices for every cut, as many of each
         cuts, prices = (pc.list_value_length(table[name]).to_numpy() for name in ("cuts", "prices"))
         return bool((cuts > 0).all() and not (prices % cuts).any())

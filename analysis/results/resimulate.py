@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import ADDED, MEASURES, format_length
+from dess.analysis.metrics import ADDED, NODE_AGES, NODE_RATIOS, format_length, without_nodes
 from dess.analysis.results.event_log import causes_of_failure
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
@@ -21,7 +21,13 @@ from dess.analysis.study.stopping import Text
 from dess.base.files.documents import Document
 from dess.base.files.reading import hash_file, paths_in
 from dess.base.files.tables import LIMIT
-from dess.model.record import MISSION_RECORD, UAV_RECORD, MissionRecord
+from dess.model.record import (
+    MISSION_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    MissionRecord,
+    node_ratios,
+)
 from dess.model.state import END_NAMES, sample_scenario
 from dess.policies.registry import TRAINED, Policy, load_team
 from dess.scenario.fields import SAMPLED
@@ -152,8 +158,8 @@ def stored_record(results: Results, policy: str, point: int, replication: int) -
     )
     if missions or checks:
         row = (missions or checks)[0]
-        measured = (name for name in MEASURES if name in row and not isnan(row[name]))
-        return _by_field(row, uavs) | {name: row[name] for name in measured}
+        measured = (n for n in OPERATIONS.names or () if n in row and not isnan(row[n]))
+        return _by_field(row, uavs) | {name: row[name] for name in measured} | _hash_of_nodes(row)
     raise InputError(
         results.store.folder,
         f"no mission of {policy}, point {point}, replication {replication}",
@@ -166,6 +172,9 @@ def difference_in_words(record: MissionRecord, fields: Mapping[str, Any]) -> str
     uavs = _uavs_of(record).to_dict("records")
     metrics = {name: record.metrics[name] for name in MISSION_RECORD.names or ()}
     simulated = _by_field(metrics, uavs) | record.measured
+    if record.nodes is not None and NODES in fields:
+        kept = {NODE_RATIOS: node_ratios(record.nodes), NODE_AGES: record.nodes["age"]}
+        simulated |= _hash_of_nodes(kept)
     names = [*fields, *(name for name in record.measured if name not in fields)]
     changed = [name for name in names if simulated.get(name) != fields.get(name)]
     if not changed:
@@ -185,6 +194,14 @@ def _by_field(mission: Mapping[Any, Any], uavs: Sequence[Mapping[Any, Any]]) -> 
     return fields
 
 
+def _hash_of_nodes(mission: Mapping[Any, Any]) -> dict[str, str]:
+    """A hash of what is kept of the nodes of a mission, if something is."""
+    if NODE_RATIOS not in mission:
+        return {}
+    values = np.concatenate([mission[NODE_RATIOS], mission[NODE_AGES]])
+    return {NODES: sha256(values.astype("<f8").tobytes()).hexdigest()[:16]}
+
+
 def _uavs_of(record: MissionRecord) -> pd.DataFrame:
     """The records of the UAVs, as results have them."""
     return pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
@@ -197,6 +214,7 @@ def _rows_of_mission(table: pd.DataFrame, mission: Mapping[str, Any]) -> pd.Data
     return table
 
 
+NODES = "nodes"  # the field of a record with the hash of the values of its nodes
 SAMPLE = 32  # missions of a study that a page contains
 
 
@@ -286,5 +304,13 @@ def draw_numbers(count: int, most: int, seed: int) -> Sequence[int]:
 def _hash_of_records(results: Results) -> int:
     """A number that depends on every record."""
     tables = (results.missions, results.checks, results.uavs)
-    hashes = [pd.util.hash_pandas_object(table, index=False).to_numpy() for table in tables]
+    hashes = [
+        pd.util.hash_pandas_object(without_nodes(table), index=False).to_numpy() for table in tables
+    ]
+    hashes += [
+        np.concatenate(table[name].to_numpy()).view(np.uint64)
+        for table in tables
+        for name in (NODE_RATIOS, NODE_AGES)
+        if name in table and len(table)
+    ]
     return int(sha256(np.concatenate(hashes).tobytes()).hexdigest()[:16], 16)

@@ -26,10 +26,14 @@ from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import (
     COST,
+    LEAST,
     LEAST_COST,
     MOST_COST,
     MOST_SLOTS,
     MOST_WAITING,
+    NODE_AGES,
+    NODE_RATIOS,
+    OLDEST,
     columns_in_units,
     longest_wait,
 )
@@ -42,6 +46,7 @@ from dess.analysis.results.manifest import (
     Part,
     Selected,
 )
+from dess.analysis.stats.intervals import worst_node
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in
@@ -432,7 +437,7 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        missions = self._rows("missions", parts)
+        missions = _with_worst_nodes(self._rows("missions", parts))
         spaces = self.manifest.scenarios
         points = missions["point"].to_numpy()
         missions[MOST_SLOTS] = np.array([space.max_slots for space in spaces])[points]
@@ -527,6 +532,25 @@ class Store:
         """The event log of a replication of a cell, if it is present."""
         path = self._logs.get((cell.key, replication))
         return parquet.read(path) if path else None
+
+
+def _with_worst_nodes(missions: pd.DataFrame) -> pd.DataFrame:
+    """The missions with the value of the node that is the worst at their design point.
+
+    Without data sheets, and where an earlier version has simulated some of them, there is none.
+    """
+    for metric, nodes in ((LEAST, NODE_RATIOS), (OLDEST, NODE_AGES)):
+        if nodes not in missions:
+            continue
+        if missions[nodes].isna().any():
+            missions = missions.drop(columns=nodes)
+            continue
+        worst = np.empty(len(missions))
+        for rows in missions.reset_index(drop=True).groupby("point").indices.values():
+            by_node = np.stack(missions[nodes].to_numpy()[rows])
+            worst[rows] = by_node[:, worst_node(by_node.mean(axis=0), metric)]
+        missions[metric] = worst
+    return missions
 
 
 def gaps_between(wanted: range, present: list[range]) -> list[range]:

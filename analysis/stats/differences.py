@@ -201,6 +201,7 @@ def difference_test(
     """
     differences = differences_of(a, b)
     measure = metric_of(metric)
+    level = measure.level_of_each(level)
     rare = intervals.rare_differences(measure, a.mean(), b.mean())
     if rare is None or (differences.size == 1 and not measure.is_bounded):
         return t_test(differences, level)
@@ -209,6 +210,7 @@ def difference_test(
         p = mcnemar_p_value(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
     limit = measure.range[1] - measure.range[0]
     mean = float(differences.mean())
+    p = min(p * measure.among, 1.0)
     return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
 
 
@@ -246,6 +248,7 @@ def column_tests(
     n = differences.count()
     mean = differences.mean()
     measure = metric_of(metric)
+    levels = measure.level_of_each(levels)
     half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - levels) / 2)
     ends = {"low": mean - half, "high": mean + half}
     table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
@@ -268,7 +271,7 @@ def column_tests(
     half = -stdtrit(size - 1, (1 - levels) / 2) * error
     table["low"] = centre - half
     table["high"] = centre + half
-    table["p"] = 2 * stdtr(size - 1, -(centre / error).abs())
+    table["p"] = (2 * stdtr(size - 1, -(centre / error).abs()) * measure.among).clip(upper=1.0)
     limit = measure.range[1] - measure.range[0]
     table[["low", "high"]] = table[["low", "high"]].clip(-limit, limit)
     if not measure.is_bounded:

@@ -6,7 +6,7 @@ intervals; statistics that have no formula are bootstrapped.
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from functools import reduce
+from functools import partial, reduce
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -15,7 +15,14 @@ import scipy
 from scipy.special import ndtr, ndtri, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import PRODUCT, Metric, metric_in_missions, metric_of, metrics_in
+from dess.analysis.metrics import (
+    NODES_BEHIND,
+    PRODUCT,
+    Metric,
+    metric_in_missions,
+    metric_of,
+    metrics_in,
+)
 from dess.base.errors import unknown_name
 
 LEVEL = 0.95
@@ -277,6 +284,28 @@ class Moments(NamedTuple):
         )
 
     @classmethod
+    def of_worst_node(cls, nodes: Sequence[Self], metric: str | Metric) -> Self:
+        """The moments of the linearised values of ``worst_of_nodes``.
+
+        Args:
+            nodes: The moments of the metric at each node.
+            metric: The metric, of as many nodes.
+        """
+        means = np.array([node.mean for node in nodes])
+        ends = np.array([node.interval(metric)[1:] for node in nodes])
+        worst, farthest, scale = worst_and_spread(means, ends, metric)
+        chosen = nodes[farthest]
+        mean = means[worst]
+        return cls(
+            n=chosen.n,
+            total=mean * chosen.n,
+            squares=chosen.squares * scale**2,
+            cubes=chosen.cubes * scale**3,
+            least=mean + scale * (chosen.least - chosen.mean),
+            most=mean + scale * (chosen.most - chosen.mean),
+        )
+
+    @classmethod
     def of_space(cls, fleets: Sequence[Self | None], missions: int) -> Self:
         """The moments of the linearised values of ``post_stratified``.
 
@@ -300,6 +329,7 @@ class Moments(NamedTuple):
     def interval(self, metric: str | Metric, level: float = LEVEL) -> Interval:
         """The mean of a metric with the interval of ``interval_of``."""
         measure = metric_of(metric)
+        level = measure.level_of_each(level)
         if measure.is_outcome and self._are_outcomes:
             return share_interval(int(self.total), self.n, level)
         plain = self.student(level)
@@ -393,6 +423,7 @@ def stratified_interval(values: np.ndarray, metric: str | Metric, level: float =
     points = values.shape[1]
     if points == 1:
         return interval_of(measure, values[present], level)
+    level = measure.level_of_each(level)
     means = np.nansum(values, axis=0) / n
     residuals = np.where(present, values - means, 0.0)
     mean = float(means.mean())
@@ -466,7 +497,7 @@ def column_intervals(
     measure = metric_of(metric)
     n = values.count()
     mean = values.mean()
-    level = pd.Series(levels, index=values.columns)
+    level = measure.level_of_each(pd.Series(levels, index=values.columns))
     deviations = values - mean
     skewness = skewness_of((deviations**2).sum(), (deviations**3).sum(), n)
     size = np.maximum(n, 1)
@@ -569,14 +600,105 @@ def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) ->
         metric: The metric.
         spaces: The columns that tell the spaces apart, such as ``point``.
     """
-    values = missions[metric].to_numpy(float).copy()
-    if "uavs" in missions:
+    if NODES_BEHIND.get(metric) in missions:
+        values = np.empty(len(missions))
+        adjust = partial(_values_of_worst_node, missions, metric)
+    else:
+        values = missions[metric].to_numpy(float).copy()
+        if "uavs" not in missions:
+            return values
         fleets = missions["uavs"].to_numpy()
-        table = missions[[*spaces]].reset_index(drop=True)
-        for _, part in group_rows(table, spaces):
-            rows = part.index.to_numpy()
-            values[rows] = post_stratified(values[rows], fleets[rows])
+
+        def adjust(rows: np.ndarray) -> np.ndarray:
+            return post_stratified(values[rows], fleets[rows])
+
+    table = missions[[*spaces]].reset_index(drop=True)
+    for _, part in group_rows(table, spaces):
+        rows = part.index.to_numpy()
+        values[rows] = adjust(rows)
     return values
+
+
+def _values_of_worst_node(missions: pd.DataFrame, metric: str, rows: np.ndarray) -> np.ndarray:
+    """The linearised values of ``worst_of_nodes``, of rows of missions of one scenario space.
+
+    Those of scenarios with different numbers of nodes are the values of the worst node of each.
+    """
+    of_space = missions.iloc[rows]
+    of_missions = of_space[NODES_BEHIND[metric]].to_numpy()
+    if len({len(nodes) for nodes in of_missions}) > 1:
+        return of_space[metric].to_numpy(float)
+    by_node = np.stack(of_missions)
+    if "uavs" in of_space and of_space["uavs"].nunique() > 1:
+        fleets = of_space["uavs"].to_numpy()
+        by_node = np.apply_along_axis(post_stratified, 0, by_node, fleets)
+    return worst_of_nodes(by_node, metric_in_missions(of_space, metric))
+
+
+def worst_node(means: np.ndarray, metric: str | Metric) -> int:
+    """The node whose mean is the worst; the first one of several."""
+    if metric_of(metric).less_is_better:
+        return int(np.argmax(means))
+    return int(np.argmin(means))
+
+
+def worst_and_spread(
+    means: np.ndarray, ends: np.ndarray, metric: str | Metric
+) -> tuple[int, int, float]:
+    """The worst node, and how wide the interval of its mean has to be: see ``worst_of_nodes``.
+
+    Args:
+        means: (K,) means of the nodes.
+        ends: (K, 2) ends of intervals that hold for all nodes together; nan if unknown.
+        metric: The metric.
+
+    Returns:
+        The worst node, the node whose interval has the worst end, and by which factor the
+        deviations of the latter give an interval of the worst mean with that end.
+    """
+    worst = worst_node(means, metric)
+    if metric_of(metric).less_is_better:
+        ends_of_nodes = np.nan_to_num(ends[:, 1], nan=-np.inf)
+        farthest = int(np.argmax(ends_of_nodes))
+    else:
+        ends_of_nodes = np.nan_to_num(ends[:, 0], nan=np.inf)
+        farthest = int(np.argmin(ends_of_nodes))
+    width = means[farthest] - ends_of_nodes[farthest]
+    if not np.isfinite(width) or width == 0:
+        return worst, worst, 1.0
+    return worst, farthest, float((means[worst] - ends_of_nodes[farthest]) / width)
+
+
+def worst_of_nodes(by_node: np.ndarray, metric: Metric) -> np.ndarray:
+    """Values whose mean is that of the worst node, and whose interval holds whichever it is.
+
+    The own interval of the node that did worst would be too narrow, since another one, whose values
+    vary more, may be the worst. So the lower end of a ratio (the upper one of an age) is to be the
+    lowest of all nodes, of intervals that hold for all nodes together (``Metric.level_of_each``):
+    these values deviate from their mean as those of the node with this end, by as much less as its
+    mean is higher.
+
+    Why it holds, for a ratio: with the probability asked for, the interval of every node has its
+    true mean. Then the lower end here is not above that of the node that is truly the worst, which
+    is below its mean. The upper end is not below the own one of the node that did worst, which is
+    above its true mean, and no true mean is below the worst.
+
+    Args:
+        by_node: (n, K) values of n missions at K nodes.
+        metric: The metric, of K nodes.
+
+    Returns:
+        (n,) the values.
+    """
+    means = by_node.mean(axis=0)
+    if rare_values(metric, means) is not None:  # as column_intervals, which takes much longer
+        level = metric.level_of_each(LEVEL)
+        ends_of_nodes = ends_of_means(metric, means, by_node.var(axis=0), 0.0, len(by_node), level)
+        ends = np.transpose(ends_of_nodes)
+    else:
+        ends = column_intervals(pd.DataFrame(by_node), metric)[["low", "high"]].to_numpy()
+    worst, farthest, scale = worst_and_spread(means, ends, metric)
+    return means[worst] + scale * (by_node[:, farthest] - means[farthest])
 
 
 def by_replication(

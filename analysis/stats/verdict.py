@@ -331,7 +331,7 @@ def may_be_best(
     mask = present.astype(float)
     if looks is None:
         looks = np.zeros(values.shape[1], int)
-    error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1)
+    error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1) / measure.among
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare: list[Any] = [None] * len(blocks)
     if allowance:

@@ -12,7 +12,15 @@ from scipy.special import stdtrit
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.metrics import AGE, column_in_sheet_unit, size_of
+from dess.analysis.metrics import (
+    AGE,
+    LEAST,
+    NODES_BEHIND,
+    OLDEST,
+    column_in_sheet_unit,
+    metric_of,
+    size_of,
+)
 from dess.analysis.names import DECISIONS
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
@@ -24,6 +32,7 @@ from dess.scenario.quantities import quantity_of
 from dess.scenario.scenario import ScenarioSpace
 
 Verdict = Literal["met", "missed", "open"]
+_MOST_SERIOUS_FIRST = ("missed", "open", "met")
 
 # The largest stake, as a share of the stake with which a single value could lose everything.
 _BOLDEST = 0.999
@@ -38,13 +47,24 @@ class MeanTest:
         missions: Number of values observed up to the verdict; all values if it is ``open``.
     """
 
-    def __init__(self, required: float, tolerance: float, error: float):
+    def __init__(
+        self, required: float, tolerance: float, error: float, error_of_miss: float | None = None
+    ):
+        """Begin a test.
+
+        Args:
+            required: The least mean.
+            tolerance: How far from it either verdict is right.
+            error: The largest probability of each wrong verdict.
+            error_of_miss: That of the verdict ``missed``, if it has another one.
+        """
         self.required = required
         least = required - tolerance
         most = required + tolerance
         self._at_most = _Wealth(least, tolerance)
         self._at_least = _Wealth(1 - most, tolerance)
-        self._target = -np.log(error)
+        self._target_of_met = -np.log(error)
+        self._target_of_missed = -np.log(error_of_miss or error)
         self.verdict: Verdict = "open"
         self.missions = 0
 
@@ -52,14 +72,49 @@ class MeanTest:
         """Take more values into account, in the order of their replications."""
         if self.verdict != "open" or not len(values):
             return
-        met = _first_true(self._at_most.after(values) >= self._target)
-        missed = _first_true(self._at_least.after(1 - values) >= self._target)
+        met = _first_true(self._at_most.after(values) >= self._target_of_met)
+        missed = _first_true(self._at_least.after(1 - values) >= self._target_of_missed)
         if min(met, missed) < len(values):
             if met < missed:
                 self.verdict = "met"
             else:
                 self.verdict = "missed"
         self.missions += min(met + 1, missed + 1, len(values))
+
+
+class WorstNodeTest:
+    """A sequential test of whether the means of all nodes meet a requirement.
+
+    It is met once each node has been found to meet it. That is wrong only if it is wrong of the
+    worst node, so the test of every node has the whole error (an intersection-union test: R. L.
+    Berger, Technometrics 24 (1982) 295-300). It is missed once a node has been found to miss it,
+    for which the nodes share the error.
+
+    Attributes:
+        required, verdict, missions: As of a ``MeanTest``.
+    """
+
+    def __init__(self, required: float, tolerance: float, error: float):
+        self.required = required
+        self.verdict: Verdict = "open"
+        self.missions = 0
+        self._limits = tolerance, error
+        self._tests: list[MeanTest] = []
+
+    def observe(self, values: np.ndarray) -> None:
+        """Take more (n, K) values of K nodes into account, in the order of their replications."""
+        if self.verdict != "open" or not len(values):
+            return
+        nodes = values.shape[1]
+        tolerance, error = self._limits
+        self._tests = self._tests or [
+            MeanTest(self.required, tolerance, error, error / nodes) for _ in range(nodes)
+        ]
+        for test, of_node in zip(self._tests, values.T, strict=True):
+            test.observe(of_node)
+        self.missions += len(values)
+        verdicts = {test.verdict for test in self._tests}
+        self.verdict = min(verdicts, key=_MOST_SERIOUS_FIRST.index)
 
 
 class _Wealth:
@@ -215,7 +270,11 @@ def group_points(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[s
 # How much longer a search may take for which it is estimated: times its missions, and missions.
 FURTHER, MOST_FURTHER = 64, 10_000_000
 
-Required = Literal["success", "collection_ratio", "collection_ratio_and_communication", "age"]
+Required = Literal[
+    "success", "collection_ratio", "collection_ratio_and_communication", "age", "least", "oldest"
+]
+_AGES = (AGE, OLDEST)
+_OF_NODES = (LEAST, OLDEST)
 
 
 class Setting(NamedTuple):
@@ -253,7 +312,7 @@ def as_share(metric: str, value: Any, horizon: float) -> Any:
         value: A value, or an array of values.
         horizon: The largest age.
     """
-    if metric == AGE:
+    if metric in _AGES:
         return 1 - value / horizon
     return value
 
@@ -293,7 +352,7 @@ class Cheapest(StrictTable):
     procedure: Literal["cheapest"]
     requirements: dict[Required, Number | Line] = Field(
         min_length=1,
-        description="metric -> its least mean; of age the largest, with a data sheet in a unit",
+        description="metric -> its least mean; of an age the largest, with a data sheet in a unit",
     )
     tolerance: Number = Field(
         0.005,
@@ -322,8 +381,8 @@ class Cheapest(StrictTable):
     @classmethod
     def _are_amounts(cls, given: Any) -> Any:
         for metric, amount in given.items() if isinstance(given, dict) else ():
-            if not is_number(amount) and not (metric == AGE and isinstance(amount, str)):
-                form = 'a number, or of age a time such as "6 h"'
+            if not is_number(amount) and not (metric in _AGES and isinstance(amount, str)):
+                form = 'a number, or of an age a time such as "6 h"'
                 raise InputError("", f"{metric} is {shown(amount)}", form)
         return given
 
@@ -333,7 +392,7 @@ class Cheapest(StrictTable):
             share = 0.0
             if not isinstance(least, str):
                 share = least
-            if metric != AGE and not self.tolerance < share < 1 - self.tolerance:
+            if metric not in _AGES and not self.tolerance < share < 1 - self.tolerance:
                 raise InputError(
                     f"requirements.{metric}",
                     f"{share:g} is out of range",
@@ -343,7 +402,7 @@ class Cheapest(StrictTable):
         return self
 
     def amount(self, metric: Required) -> float:
-        """What is required of a metric; of age in hours if it has a unit, otherwise in slots.
+        """What is required of a metric; of an age in hours if it has a unit, otherwise in slots.
 
         Raises:
             InputError: If it has another unit than one of time.
@@ -353,26 +412,36 @@ class Cheapest(StrictTable):
             return quantity_of(required, f"requirements.{metric}", "s") / 3600
         return float(required)
 
-    def check_age(self, spaces: Sequence[ScenarioSpace]) -> None:
-        """Check that the required age has a unit where there is a data sheet, and can be missed.
+    def check_requirements(self, spaces: Sequence[ScenarioSpace]) -> None:
+        """Check that scenarios measure what is required, and that ages fit to them.
 
         Raises:
-            InputError: If it has none, or is out of range, or a scenario does not measure it.
+            InputError: If a scenario does not measure something, or an age has no unit where there
+                is a data sheet, or cannot be missed.
         """
-        where = f"requirements.{AGE}"
-        for space in spaces if AGE in self.requirements else ():
-            required = self.requirements["age"]
-            horizon = horizon_of(space)
-            share = self.amount("age") / horizon
-            has_unit = isinstance(required, str)
-            if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
-                if space.units:
-                    allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
-                else:
-                    allowed = f"mission slots in the horizon of {horizon:g}"
-                raise InputError(where, f"{shown(required)} does not fit", allowed)
-            if not space.age.measured:
-                raise InputError(where, "is not measured", "age.measured = true")
+        for metric in self.requirements:
+            for space in spaces:
+                if metric in _OF_NODES and not space.units:
+                    raise InputError(
+                        f"requirements.{metric}", "is not measured", "a scenario with a data sheet"
+                    )
+                if metric in _AGES:
+                    self._check_age(metric, space)
+
+    def _check_age(self, metric: Required, space: ScenarioSpace) -> None:
+        where = f"requirements.{metric}"
+        required = self.requirements[metric]
+        horizon = horizon_of(space)
+        share = self.amount(metric) / horizon
+        has_unit = isinstance(required, str)
+        if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
+            if space.units:
+                allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
+            else:
+                allowed = f"mission slots in the horizon of {horizon:g}"
+            raise InputError(where, f"{shown(required)} does not fit", allowed)
+        if metric == AGE and not space.age.measured:
+            raise InputError(where, "is not measured", "age.measured = true")
 
     def wanted(self, samples: Samples, settings: Sequence[Setting]) -> list[int]:
         """The number of missions that every design point needs.
@@ -423,7 +492,7 @@ class Cheapest(StrictTable):
         endless = self.model_copy(update={"budget": MOST})
         names = [
             "cost",
-            *(column_in_sheet_unit(metric, search.samples[0]) for metric in self.requirements),
+            *(_column_of(metric, search.samples[0]) for metric in self.requirements),
         ]
         points = [*zip(search.samples, search.points.counts, strict=True)]
         times = 2
@@ -457,10 +526,13 @@ class Cheapest(StrictTable):
         sign = "-" if shift > 0 else "+"
         means = []
         for metric, amount in self.requirements.items():
-            if isinstance(amount, str) or metric == AGE:
-                means.append(f"{metric} of at most {amount} {sign} {abs(shift):g} horizons")
+            name = metric.replace("_", " ")
+            if metric in _OF_NODES:
+                name = metric_of(metric).within
+            if metric in _AGES or isinstance(amount, str):
+                means.append(f"{name} of at most {amount} {sign} {abs(shift):g} horizons")
             else:
-                means.append(f"{metric.replace('_', ' ')} of at least {amount + shift:g}")
+                means.append(f"{name} of at least {amount + shift:g}")
         return f"a mean {' and a mean '.join(means)}"
 
 
@@ -470,6 +542,23 @@ AnySelection = Annotated[
     Field(discriminator="procedure"),
     of_its_kind("procedure", Selection, Cheapest),
 ]
+
+
+_KIND_OF_TEST: dict[str, type[WorstNodeTest]] = dict.fromkeys(_OF_NODES, WorstNodeTest)
+
+
+def _column_of(metric: str, sample: Mapping[str, np.ndarray]) -> str:
+    """The column of missions that a requirement is tested on: of a node those of all nodes."""
+    column = column_in_sheet_unit(metric, sample)
+    return NODES_BEHIND.get(column, column)
+
+
+def _values_of(metric: str, sample: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The (n,) values of a requirement; of a node the (n, K) ones of all nodes."""
+    values = sample[_column_of(metric, sample)]
+    if metric in _OF_NODES:
+        return np.stack([*values])
+    return np.asarray(values, float)
 
 
 class _Points:
@@ -512,7 +601,9 @@ class _Search:
         error_of_test = self._error / (len(samples) * len(rule.requirements))
         self._tests = [
             {
-                m: MeanTest(as_share(m, rule.amount(m), s.horizon), rule.tolerance, error_of_test)
+                m: _KIND_OF_TEST.get(m, MeanTest)(
+                    as_share(m, rule.amount(m), s.horizon), rule.tolerance, error_of_test
+                )
                 for m in rule.requirements
             }
             for s in settings
@@ -576,9 +667,9 @@ class _Search:
         points.costs[point] = np.mean(sample["cost"][:count])
         points.promising[point] = True
         for metric, test in self._tests[point].items():
-            values = np.asarray(sample[column_in_sheet_unit(metric, sample)][:count], float)
+            values = _values_of(metric, sample)[:count]
             shares = as_share(metric, values, horizon)
             test.observe(shares[test.missions :])
-            points.promising[point] &= shares.mean() >= test.required
+            points.promising[point] &= shares.mean(axis=0).min() >= test.required
         verdicts = {test.verdict for test in self._tests[point].values()}
-        points.verdicts[point] = min(verdicts, key=["missed", "open", "met"].index)
+        points.verdicts[point] = min(verdicts, key=_MOST_SERIOUS_FIRST.index)

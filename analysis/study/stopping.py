@@ -15,7 +15,14 @@ from pydantic import (
 )
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, MEASURES, Metric, metric_in_missions, metric_of
+from dess.analysis.metrics import (
+    ALWAYS,
+    MEASURES,
+    NODES_BEHIND,
+    Metric,
+    metric_in_missions,
+    metric_of,
+)
 from dess.analysis.stats.intervals import (
     ends_of_means,
     share_half_width,
@@ -24,7 +31,8 @@ from dess.analysis.stats.intervals import (
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
-_METRICS = [*ALWAYS, *MEASURES]
+# The values of the worst node have no part in a rule: which node that is may change.
+_METRICS = [*ALWAYS, *(metric for metric in MEASURES if metric not in NODES_BEHIND)]
 
 # For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
 Samples = Sequence[Mapping[str, np.ndarray]]

@@ -272,7 +272,7 @@ class Study(StudyData):
             key = "selection.metric"
             asked = {self.selection.metric}
         elif isinstance(self.selection, Cheapest):
-            self.selection.check_age(self.scenarios)
+            self.selection.check_requirements(self.scenarios)
             return
         else:
             return

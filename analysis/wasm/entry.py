@@ -19,7 +19,14 @@ from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import BATCH, World
 from dess.model.guard.parking import parking_memory
-from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records, write_record
+from dess.model.record import (
+    MISSION_RECORD,
+    NODE_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    Records,
+    write_record,
+)
 from dess.model.state import MISSION, SENSOR, UAV, Starts, State
 from dess.model.ways_home import FAR as _FARTHEST
 from dess.model.ways_home import relax
@@ -78,6 +85,7 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "mission_records": (MISSION_RECORD, 1),  # of ``Records``
     "uav_records": (UAV_RECORD, 2),
     "operations": (OPERATIONS, 1),
+    "node_records": (NODE_RECORD, 2),  # none: no page shows them
     "prices": (_F8, 1),
     "uav_prices": (_F8, 1),  # (I,) of UAVs whose types have prices, nan for those of ``prices``
     "factors": (_F8, 1),  # of the metrics, where their unit is that of a data sheet
@@ -96,6 +104,7 @@ _NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not h
 # Compiled functions take names, not attributes, as types.
 _BATCH, _MISSION, _SENSOR, _UAV = BATCH, MISSION, SENSOR, UAV
 _MISSION_RECORD, _UAV_RECORD, _OPERATIONS = MISSION_RECORD, UAV_RECORD, OPERATIONS
+_NODE_RECORD = NODE_RECORD
 _SEQUENCE = SEQUENCE
 
 
@@ -182,6 +191,7 @@ def _records(table):
         _array1(table, _AT.mission_records, _MISSION_RECORD),
         _array2(table, _AT.uav_records, _UAV_RECORD),
         _array1(table, _AT.operations, _OPERATIONS),
+        _array2(table, _AT.node_records, _NODE_RECORD),
     )
 
 
@@ -296,7 +306,7 @@ def play(table, first, count, launches, slots):
 @kernel
 def measure(table, count):
     """Write the metrics of the first ``count`` records into ``values``."""
-    missions, uavs, _ = _records(table)
+    missions, uavs, _, _ = _records(table)
     shape = (len(missions), _COST - _MEASURED)
     operations = carray(_pointer(table[_AT.operations]), shape, _F8)
     mission = _array1(table, _AT.constants, _MISSION)[0]

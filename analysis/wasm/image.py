@@ -44,7 +44,7 @@ from dess.scenario.scenario import ScenarioSpace
 EMPTY = {
     *("missions", "uavs", "residual", "sensors", "teeth", "order", "means", "ways", "batches"),
     *("arrivals", "reach", "ways_home", "actions", "mission_records", "uav_records"),
-    *("operations", "values", "baseline", "totals", "sequences", "ends"),
+    *("operations", "node_records", "values", "baseline", "totals", "sequences", "ends"),
 }
 SHAPES = EMPTY - {"operations"}  # which begin with nan
 MOST_MEMORY = 2**27  # of an image [bytes]; each worker of a page has its own
@@ -253,6 +253,7 @@ def _arrays_of(
         "mission_records": records.missions,
         "uav_records": records.uavs,
         "operations": records.operations,
+        "node_records": records.nodes,
         "prices": _prices_of(space, costs),
         "uav_prices": _prices_of_types(space, fleet),
         "factors": _factors_of(space),

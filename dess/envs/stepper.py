@@ -16,7 +16,7 @@ from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.batch import check_slotted
 from dess.model.channel import empty_scratch, world_of
-from dess.model.record import Records, empty_records, write_records
+from dess.model.record import Records, empty_records_of, write_records
 from dess.model.state import (
     ACTION_NAMES,
     TRUNCATED,
@@ -69,7 +69,6 @@ class MissionStepper:
         self.world = world_of(self.space)
         self.state = state_of([self.space], num_envs)
         self._starts = starts_of([self.space])
-        self._is_extended = self.space.is_extended
         self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
         self.is_started = False
         self._is_seeded = seed is not None
@@ -154,8 +153,7 @@ class MissionStepper:
 
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
-        fleet = self.state.uavs.shape[1]
-        records = empty_records(len(environments), fleet, self._is_extended)
+        records = empty_records_of([self.space], len(environments))
         ways = ways_home(self.state.missions, self.world.chart)
         write_records(environments, self.state, ways, records)
         return records

@@ -21,7 +21,7 @@ from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import empty_scratch, world_of
-from dess.model.record import Records, empty_records, write_record
+from dess.model.record import Records, empty_records_of, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
 from dess.model.ways_home import ways_home
@@ -82,8 +82,7 @@ def simulate_batch(
     spaces = spaces_of([*distinct.values()])
     check_slotted(spaces)
     team = team_of(policy, spaces)
-    fleet = max((space.uavs[1] for space in spaces), default=0)
-    records = empty_records(len(numbers), fleet, any(space.is_extended for space in spaces))
+    records = empty_records_of(spaces, len(numbers))
 
     tasks, stopped = [], Event()
     for members in _by_world(spaces):

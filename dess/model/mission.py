@@ -46,7 +46,7 @@ from dess.model import channel, rules
 from dess.model.channel import empty_scratch, world_of
 from dess.model.events import Listener, LogWriter
 from dess.model.packets import Packets
-from dess.model.record import MissionRecord, empty_records, write_records
+from dess.model.record import MissionRecord, empty_records_of, write_records
 from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
 from dess.model.ways_home import ways_home
@@ -141,7 +141,7 @@ class Mission:
         *,
         events: bool = False,
     ):
-        self.is_extended = scenario.is_extended
+        self.scenario = scenario
         self.policies = policies
         self.world = world_of(scenario)
         self.shown_world = self.world.shown()  # what policies may see of it
@@ -429,7 +429,7 @@ class Mission:
 
     def write_record(self) -> MissionRecord:
         """The record of the mission."""
-        records = empty_records(1, len(self.fleet), self.is_extended)
+        records = empty_records_of([self.scenario], 1)
         ways = ways_home(self.state.missions, self.world.chart)
         write_records(np.zeros(1, np.int64), self.state, ways, records)
         if self.packets is not None:

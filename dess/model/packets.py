@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from dess.base.kernels import kernel
 from dess.model.events import Listener
-from dess.physics.age import age_of_teeth
+from dess.physics.age import add_tooth, age_of_teeth
 from dess.physics.arrivals import draw_arrival, factors_of, sources_of
 
 
@@ -157,6 +158,12 @@ def teeth_of(done: np.ndarray, nodes: int, end: float) -> tuple[np.ndarray, np.n
     return lows, highs, len(teeth)
 
 
+@kernel
+def _add_tooth(missions, sensors, k, time, generated):
+    newest = sensors[k].newest
+    add_tooth(missions[0], sensors[k], time - newest, time - generated)
+
+
 class Packets:
     """The packets of one mission; the initial data of a node are a packet generated at time 0.
 
@@ -207,6 +214,7 @@ class Packets:
         time, is_silent = float(self._sources["time"][k]), sensor["silent"]
         amount = self._message
         mission["arrived"] += amount
+        sensor["arrived"] += amount
         lost = b.store(k, time, amount)
         gained = amount if lost < 0 else amount - b.all[lost].remaining
         if is_silent and mission["node_data_lost"]:
@@ -238,6 +246,7 @@ class Packets:
         for number in b.delivered[before:]:
             sensor, generated = self._sensors[b.all[number].node], b.all[number].generated
             if generated > sensor["newest"]:
+                _add_tooth(self._missions, self._sensors, b.all[number].node, time, generated)
                 self._mission["newest"] += generated - sensor["newest"]
                 sensor["newest"] = generated
         self._tell("delivery", b.delivered[before:])

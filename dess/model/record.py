@@ -1,5 +1,6 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isnan
 from typing import Any, NamedTuple
@@ -10,12 +11,12 @@ from dess.base.kernels import inlined, kernel
 from dess.model.events import EventLog
 from dess.model.rules import data_left
 from dess.model.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
-from dess.physics.age import write_age
+from dess.physics.age import age_of_node, write_age
 from dess.physics.charging import write_use
 from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import write_failures
 from dess.physics.section import for_sections
-from dess.scenario.scenario import Constants
+from dess.scenario.scenario import Constants, ScenarioSpace
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
 MISSION_RECORD = np.dtype(
@@ -59,6 +60,10 @@ OPERATIONS = np.dtype(
     ]
 )
 
+# One node of a mission: its data [data units], of which ``collected`` is what UAVs have taken from
+# it (also what was lost with a UAV), its mean age, and its age at the end [slots].
+NODE_RECORD = np.dtype(fields(np.float64, "initial arrived collected residual age age_at_end"))
+
 
 def measures_of(space: Constants) -> list[str]:
     """The fields of ``OPERATIONS`` that a scenario measures.
@@ -82,23 +87,45 @@ class Records(NamedTuple):
         missions: (N,) ``MISSION_RECORD``.
         uavs: (N, I) ``UAV_RECORD``.
         operations: (N,) ``OPERATIONS`` if one of the scenarios is extended, otherwise (0,).
+        nodes: (N, K) ``NODE_RECORD`` if one of the scenarios has a data sheet, otherwise (0, 0).
+            Where a mission has fewer nodes than the array, the other rows are nan.
     """
 
     missions: np.ndarray
     uavs: np.ndarray
     operations: np.ndarray = np.zeros(0, OPERATIONS)
+    nodes: np.ndarray = np.zeros((0, 0), NODE_RECORD)
 
     def mission(self, row: int, events: EventLog | None = None) -> "MissionRecord":
         """The record of one mission, with its event log if there is one."""
         metrics = self.missions[row]
         operations = self.operations[row] if len(self.operations) else None
-        return MissionRecord(metrics, self.uavs[row, : metrics["uavs"]], events, operations)
+        nodes = nodes_of(self.nodes[row]) if len(self.nodes) else None
+        return MissionRecord(metrics, self.uavs[row, : metrics["uavs"]], events, operations, nodes)
 
     def add(self, row: int, record: "MissionRecord") -> None:
         """Put the record of one mission into a row."""
         self.missions[row], self.uavs[row, : len(record.uavs)] = record.metrics, record.uavs
         if record.operations is not None:
             self.operations[row] = record.operations
+        if record.nodes is not None:
+            self.nodes[row, : len(record.nodes)] = record.nodes
+
+
+def nodes_of(records: np.ndarray) -> np.ndarray:
+    """The records of the nodes of a mission, of a row of ``Records.nodes``."""
+    return records[~np.isnan(records["initial"])]
+
+
+def node_ratios(records: np.ndarray) -> np.ndarray:
+    """The collection ratio of every node, of an array of ``NODE_RECORD``; without any data it is 1.
+
+    As in ``MISSION_RECORD``, rounding does not put it below 0 or above 1.
+    """
+    total = records["initial"] + records["arrived"]
+    ratios = np.ones(records.shape)
+    np.divide(records["collected"], total, out=ratios, where=total != 0)
+    return np.clip(ratios, 0.0, 1.0)
 
 
 @kernel
@@ -158,6 +185,7 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
     record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
     _write_operations(mission, uavs, sensors, teeth, records.operations, row)
+    _write_nodes(mission, residual, sensors, records.nodes, row)
 
 
 @inlined
@@ -186,12 +214,41 @@ def _write_operations(mission, uavs, sensors, teeth, operations, row):
         write_failures(mission, out)
 
 
-def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Records:
-    """Zeroed records of that many missions and UAVs per mission; ``operations`` are nan."""
+@for_sections
+def _write_nodes(mission, residual, sensors, nodes, row):
+    """Write the ``NODE_RECORD`` of every node, if there is an array for them."""
+    if row >= len(nodes):
+        return
+    for k in range(mission.nodes):
+        out, sensor = nodes[row, k], sensors[k]
+        out.initial = sensor.initial
+        out.arrived = sensor.arrived
+        out.collected = sensor.collected
+        out.residual = residual[k] + sensor.hidden
+        out.age, out.age_at_end = age_of_node(mission, sensor)
+
+
+def empty_records(missions: int, uavs: int, is_extended: bool = False, nodes: int = 0) -> Records:
+    """Zeroed records of that many missions and UAVs per mission; ``operations`` are nan.
+
+    With ``nodes`` there is also room for the records of so many nodes, which are nan.
+    """
     operations = np.full(missions if is_extended else 0, np.nan, OPERATIONS)
+    of_nodes = np.full((missions if nodes else 0, nodes), np.nan, NODE_RECORD)
     return Records(
-        np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD), operations
+        np.zeros(missions, MISSION_RECORD),
+        np.zeros((missions, uavs), UAV_RECORD),
+        operations,
+        of_nodes,
     )
+
+
+def empty_records_of(spaces: Iterable[ScenarioSpace], missions: int) -> Records:
+    """``empty_records`` for missions of some scenarios."""
+    known = [*spaces]
+    fleet = max((space.uavs[1] for space in known), default=0)
+    nodes = max((len(space.nodes) for space in known if space.units), default=0)
+    return empty_records(missions, fleet, any(space.is_extended for space in known), nodes)
 
 
 @dataclass(frozen=True)
@@ -203,12 +260,14 @@ class MissionRecord:
         uavs: (I,) ``UAV_RECORD`` array.
         events: The event log, or None.
         operations: ``OPERATIONS`` scalar of an extended scenario, or None.
+        nodes: (K,) ``NODE_RECORD`` of a scenario with a data sheet, or None.
     """
 
     metrics: np.void
     uavs: np.ndarray
     events: EventLog | None = None
     operations: np.void | None = None
+    nodes: np.ndarray | None = None
 
     def __getattr__(self, name: str) -> Any:
         if name in (MISSION_RECORD.names or ()):

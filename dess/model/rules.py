@@ -72,6 +72,14 @@ def launch(state, b, starts, number, replication):
         sensors[k].newest = sensors[k].hidden = 0.0
         sensors[k].silent = False
         sensors[k].rate = starts.rates[number, k]
+        _launch_node(mission, sensors[k], residual[k])
+
+
+@for_sections
+def _launch_node(mission, sensor, initial):
+    """Begin to count the data and the age of a node."""
+    sensor.initial = initial
+    sensor.arrived = sensor.collected = sensor.age_area = 0.0
 
 
 @kernel
@@ -329,6 +337,7 @@ def communicate(
             continue
         amount = min(channel.rate(mission, snr) * u.rate, residual[node])
         residual[node] -= amount
+        _count_collected(mission, sensors[node], amount)
         if residual[node] == 0.0:
             age.empty(mission, sensors[node], teeth, n)
         u.served = node
@@ -337,6 +346,11 @@ def communicate(
         u.collected += amount
         u.communications += 1
         mission.slot_collected += amount
+
+
+@for_sections
+def _count_collected(mission, sensor, amount):
+    sensor.collected += amount
 
 
 @kernel
@@ -385,6 +399,12 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
         if arrivals[k] > 0.0:
             residual[k] += arrivals[k]
             mission.arrived += arrivals[k]
+            _count_arrived(mission, sensors[k], arrivals[k])
+
+
+@for_sections
+def _count_arrived(mission, sensor, amount):
+    sensor.arrived += amount
 
 
 @for_sections

@@ -153,6 +153,9 @@ SENSOR = np.dtype(
         ("silent", np.bool_),
         ("hidden", np.float64),  # its data while it is silent [data units]
         ("rate", np.float64),  # its arrival rate, where nodes have their own
+        # Where the scenario has sections: its data [data units], and the area below its age until
+        # the newest of its data was collected [slots^2].
+        *fields(np.float64, "initial arrived collected age_area"),
     ],
     align=True,
 )

@@ -51,6 +51,7 @@ def empty(mission, sensor, teeth, n):
         return
     now = mission.slot + n / mission.communication_slots
     _end_tooth(mission, sensor, teeth, now)
+    add_tooth(mission, sensor, now - sensor.newest, 0.0)
     mission.newest += now - sensor.newest
     sensor.newest = now
 
@@ -59,6 +60,23 @@ def empty(mission, sensor, teeth, n):
 def _end_tooth(mission, sensor, teeth, now):
     if mission.age_measured != 0:
         teeth[_length(mission, sensor, now)] += 1
+
+
+@for_sections
+def add_tooth(mission, sensor, high, low):
+    """Note that the age of a node falls from ``high`` to ``low`` [slots].
+
+    The age begins with 0 and grows by 1 per slot, so what lies below it up to here grows by the
+    difference of the squares, halved.
+    """
+    sensor.age_area += (high * high - low * low) / 2.0
+
+
+@inlined
+def age_of_node(mission, sensor):
+    """The mean age of a node over the slots of a mission, and its age at their end [slots]."""
+    at_end = mission.slot - sensor.newest
+    return (sensor.age_area + at_end * at_end / 2.0) / max(mission.slot, 1), at_end
 
 
 @inlined

@@ -253,7 +253,8 @@ def _print_answer(
 def _with_quotes(text: str) -> str:
     """The name of a currency, or a time with its unit, in TOML syntax."""
     key, _, value = text.partition("=")
-    is_text = key.strip() == "currency" or (key.strip() == "age" and value.strip(" .0123456789"))
+    is_time = key.strip() in ("age", "oldest") and value.strip(" .0123456789") != ""
+    is_text = key.strip() == "currency" or is_time
     quoted = not is_text or value.strip().startswith(("'", '"'))
     if quoted:
         return text

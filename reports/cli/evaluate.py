@@ -44,7 +44,7 @@ def evaluate(
             with more missions, those that are there are not simulated again.
     """
     from dess.analysis.execution.evaluation import Asked, check_evaluation, estimate_means
-    from dess.analysis.metrics import metric_for_length
+    from dess.analysis.metrics import metric_in_space
     from dess.analysis.study.study import engine_of
     from dess.model.record import measures_of
 
@@ -82,7 +82,7 @@ def evaluate(
             "seconds": evaluation.seconds,
         }
         | {
-            name: moments.interval(metric_for_length(name, space.max_slots, space.units))._asdict()
+            name: moments.interval(metric_in_space(name, space))._asdict()
             for name, moments in evaluation.moments.items()
         }
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}

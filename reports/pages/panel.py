@@ -26,7 +26,16 @@ from dess import InputError, simulate_batch
 from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
-from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, choose_units, metric_of, size_of
+from dess.analysis.metrics import (
+    AGE,
+    NODES_BEHIND,
+    PRODUCT,
+    RATIO,
+    SUCCESS,
+    choose_units,
+    metric_of,
+    size_of,
+)
 from dess.analysis.names import RANGES, field_named, value_text
 from dess.analysis.numbers import format_quantity
 from dess.analysis.study.prices import Costs
@@ -68,6 +77,10 @@ _PRICED = {
 }
 _NO_COSTS = Markup(
     '<p class="no-costs">The panel of this page has no costs, since they are those of a year.</p>\n'
+)
+_NO_NODES = Markup(
+    '<p class="no-costs">The panel of this page has no requirements, since it does not know what '
+    "is collected of each node.</p>\n"
 )
 _NO_NOTE = Markup("")
 _HASH = r'"([0-9a-f]{64})"'
@@ -245,6 +258,9 @@ def make_panel(
     if costs is not None and costs.years is not None:
         costs = None
         note = _NO_COSTS
+    if any(requirement.column in NODES_BEHIND for requirement in requirements):
+        note += _NO_NODES
+        requirements = ()  # a fleet that keeps only the others would be called right
     more = {
         "costs": costs,
         "requirements": {

@@ -44,6 +44,7 @@ from dess.analysis.answers.settings.home import (
     stranded_sentence,
     way_home_sentence,
 )
+from dess.analysis.answers.settings.nodes import hardly_served_clause
 from dess.analysis.answers.settings.points import (
     conditions_in_words,
     ends_of_point,
@@ -194,7 +195,8 @@ class FleetAnswer:
         parts = cost_parts_in_words(self.results, self.policy, self.points)
         return (
             f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {self.cost_in_words}{self._ends_of_cost_in_words}{parts}."
+            f"for {self.cost_in_words}{self._ends_of_cost_in_words}{parts}"
+            f"{hardly_served_clause(self.results, self.policy, self.points)}."
         )
 
     def estimates_sentence(self) -> str:

@@ -14,6 +14,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.settings.home import way_home_sentence_of, with_way_home
+from dess.analysis.answers.settings.nodes import hardly_served_clause
 from dess.analysis.answers.settings.points import (
     ends_of_point,
     ends_sentence,
@@ -120,8 +121,9 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
     what = "policy"
     if varied_values(results):
         what = "setting"
+    hardly = hardly_served_clause(results, best["policy"], [best["point"]])
     parts = [
-        f"The best {what} is {name}: {measure.within} {value}, n = {best['n']:,}.",
+        f"The best {what} is {name}: {measure.within} {value}, n = {best['n']:,}{hardly}.",
         _others_in_words(results, table.iloc[1:], what),
         ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
         way_home_sentence_of(results, best, metric),

@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -9,13 +10,15 @@ import pytest
 
 from dess import simulate_batch
 from dess.analysis import run_study, summary
-from dess.analysis.metrics import measured_in
+from dess.analysis.execution.evaluation import evaluate as evaluate_alone
+from dess.analysis.execution.evaluation import of_results
+from dess.analysis.metrics import LEAST, NODE_AGES, NODE_RATIOS, measured_in, metric_in_missions
 from dess.analysis.results.resimulate import difference_in_words, resimulate, stored_record
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import interval_of
 from dess.policies import load
 from dess.reports.cli.options import load_space
-from tests.analysis.small import grid, small_study
+from tests.analysis.small import SHEET, grid, small_study
 
 MEASURED = {"charging.measured": True, "age.measured": True}
 
@@ -90,3 +93,59 @@ def test_the_command_of_a_mission_sets_sections_and_fleets(studied):
     words = shlex.split(results.command("greedy", 0, 1))
     fields = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
     assert load_space("paper", fields) == results.scenario(0)
+
+
+# --- the nodes of missions with a data sheet ---
+
+
+@pytest.fixture(scope="module")
+def of_sheet(studied):
+    return studied(set=SHEET, design=grid(uavs=[1, 2]), missions=30)
+
+
+def test_the_worst_node_of_a_setting_is_that_of_the_least_mean(of_sheet):
+    for point in (0, 1):
+        rows = of_sheet.missions.query("policy == 'random' and point == @point")
+        nodes = simulate_batch(
+            of_sheet.scenario(point), load("random"), 7, rows["replication"]
+        ).nodes
+        ratios = nodes["collected"] / (nodes["initial"] + nodes["arrived"])
+        np.testing.assert_allclose(np.stack(rows[NODE_RATIOS].to_numpy()), ratios, rtol=1e-12)
+        np.testing.assert_array_equal(np.stack(rows[NODE_AGES].to_numpy()), nodes["age"])
+        assert rows[LEAST].mean() == pytest.approx(ratios.mean(axis=0).min())
+        assert rows[LEAST].mean() > ratios.min(axis=1).mean()  # of another node in each mission
+        hours = of_sheet.scenario(point).units.slot / 3600
+        assert rows["oldest_h"].mean() == pytest.approx(nodes["age"].mean(axis=0).max() * hours)
+
+
+def test_tables_and_evaluations_have_the_same_interval_of_the_worst_node(of_sheet):
+    means = summary(of_sheet.missions, by=["policy", "point"])
+    for metric in (LEAST, "oldest_h"):
+        row = means.query("policy == 'random' and point == 1 and metric == @metric").iloc[0]
+        alone = evaluate_alone(of_sheet.scenario(1), "random", 30, 7)
+        measure = metric_in_missions(of_sheet.missions, metric)
+        assert measure.among == 3
+        found = alone.moments[metric].interval(measure)
+        assert found == pytest.approx((row["mean"], row["low"], row["high"]))
+    table = compare(of_sheet.missions, "greedy", [LEAST, "oldest_h"], by=["point"])
+    assert len(table) == 4 and table["difference"].notna().all()
+
+
+def test_a_study_of_one_scenario_is_an_evaluation_with_its_worst_node(tmp_path):
+    study = small_study(tmp_path, set=SHEET, policies=["random"], missions=12)
+    kept = of_results(run_study(study, tmp_path / "kept"))[0]
+    alone = evaluate_alone(study.scenarios[0], "random", 12, 7)
+    assert kept.moments[LEAST] == pytest.approx(alone.moments[LEAST])
+    assert {*kept.moments} == {*alone.moments}
+
+
+def test_altered_values_of_nodes_are_found_by_simulating_again(of_sheet):
+    record = resimulate(of_sheet, "greedy", 1, 3).record
+    fields = stored_record(of_sheet, "greedy", 1, 3)
+    assert difference_in_words(record, fields) == ""
+    missions = of_sheet.missions.copy()
+    ratios = missions[NODE_RATIOS].to_numpy(copy=True)
+    ratios[:] = [np.nextafter(values, 0.5) for values in ratios]
+    altered = replace(of_sheet, missions=missions.assign(**{NODE_RATIOS: ratios}))
+    fields = stored_record(altered, "greedy", 1, 3)
+    assert "nodes is" in difference_in_words(record, fields)

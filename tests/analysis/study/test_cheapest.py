@@ -10,7 +10,7 @@ from scipy import stats
 from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
-from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, _Search
+from dess.analysis.study.cheapest import Cheapest, MeanTest, Setting, WorstNodeTest, _Search
 from dess.analysis.study.prices import PARTS, Costs, spent_battery, stranded_uavs
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
@@ -183,6 +183,30 @@ def most(trials):
 @pytest.mark.parametrize("mean, forbidden", [(0.985, "met"), (0.995, "missed")])
 def test_errors_are_rare(mean, forbidden):
     assert wrong(lambda seed: failing(seed, 1 - mean, 10_000), forbidden, 100) <= most(100)
+
+
+@pytest.mark.parametrize(
+    ("rates", "verdict"), [([0.0, 0.0], "met"), ([0.0, 0.03], "missed"), ([0.03, 0.0], "missed")]
+)
+def test_the_worst_node_decides(rates, verdict):
+    values = np.column_stack([failing(seed, rate) for seed, rate in enumerate(rates)])
+    test = WorstNodeTest(0.99, 0.005, ERROR)
+    for block in np.array_split(values, 97):
+        test.observe(block)
+    assert test.verdict == verdict
+    alone = MeanTest(0.99, 0.005, ERROR)
+    alone.observe(values[:, np.argmax(rates)])
+    assert alone.verdict == verdict and alone.missions <= test.missions
+
+
+@pytest.mark.parametrize("mean, forbidden", [(0.985, "met"), (0.995, "missed")])
+def test_errors_on_the_worst_of_five_nodes_are_rare(mean, forbidden):
+    def verdict(seed):
+        test = WorstNodeTest(0.99, 0.005, ERROR)
+        test.observe(np.column_stack([failing(5 * seed + k, 1 - mean, 3000) for k in range(5)]))
+        return test.verdict
+
+    assert np.mean([verdict(seed) == forbidden for seed in range(30)]) <= most(30)
 
 
 def rule(**fields):

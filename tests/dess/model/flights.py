@@ -51,6 +51,8 @@ def is_same(records: Records, job: int, single: MissionRecord) -> bool:
     pairs = [(records.missions[job], single.metrics), (records.uavs[job], uavs)]
     if single.operations is not None:
         pairs.append((records.operations[job], single.operations))
+    if single.nodes is not None:
+        pairs.append((records.nodes[job, : len(single.nodes)], single.nodes))
     return all(one.tobytes() == other.tobytes() for one, other in pairs)
 
 

@@ -4,15 +4,17 @@ from fractions import Fraction
 from math import isnan
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 
 from dess.model.mission import simulate
-from dess.model.record import MISSION_RECORD, measures_of
+from dess.model.record import MISSION_RECORD, NODE_RECORD, measures_of
 from dess.physics.fleet import UavType
 from dess.physics.section import Section
+from dess.policies import load
 from dess.scenario.data_sheet import DataSheet
-from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.model.auditor import audit
 from tests.drawn import (
     continuous_spaces,
@@ -83,3 +85,35 @@ def test_an_auditor_finds_the_record_in_the_log(space, policy, seed, replication
             assert found[name] == u[name]
         for name in ("collected", "reward"):
             assert found[name] == pytest.approx(u[name], abs=1e-6)
+    assert (record.nodes is None) == (space.units is None)
+    if record.nodes is not None:
+        check_nodes(record.nodes, report["nodes"])
+
+
+def check_nodes(records: np.ndarray, found: list[dict[str, float]]) -> None:
+    for node, of_auditor in zip(records, found, strict=True):
+        wanted = {name: pytest.approx(node[name], abs=1e-6) for name in NODE_RECORD.names or ()}
+        assert of_auditor == wanted
+
+
+@pytest.mark.parametrize("data", ["kept", "lost"])
+def test_an_auditor_finds_the_records_of_nodes_in_the_log_of_packets(data):
+    """In continuous time, where nodes fall silent."""
+    failures = {"node_rate": 0.02, "node_repair": 8.0, "node_data": data, "uav_rate": 0.002}
+    changes = {
+        "data_sheet.horizon": "1 h",
+        "data_sheet.message": "500 kB",
+        "arrivals.process": "continuous",
+        "failures": failures | {"uav_repair": 20.0},
+        "age.measured": True,
+    }
+    space = load_scenario("jade-bight", **changes)
+    record = simulate(space, load("greedy"), 1, 2, events=True)
+    assert record.nodes is not None and record.events is not None
+    check_nodes(record.nodes, audit(record.events.columns(), constants_of(space))["nodes"])
+    nodes = record.nodes
+    lost = nodes["initial"] + nodes["arrived"] - nodes["collected"] - nodes["residual"]
+    assert lost.sum() == pytest.approx(record.lost, abs=1e-6)
+    assert (record.lost > 0) == (data == "lost")
+    assert nodes["age"].mean() == pytest.approx(record.age)
+    assert np.ptp(nodes["age_at_end"]) > 1 and (nodes["age"] > 0).all()

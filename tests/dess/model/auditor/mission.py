@@ -21,8 +21,8 @@ def audit(columns: Mapping[str, Sequence[Any]], constants: Mapping[str, Any]) ->
         constants: The fields of the scenario; of its sections those that are on.
 
     Returns:
-        ``metrics`` of the record, ``measured`` beyond the paper's, and for each of ``uavs`` what is
-        known of it.
+        ``metrics`` of the record, ``measured`` beyond the paper's, and for each of ``uavs`` and
+        ``nodes`` what is known of it.
 
     Raises:
         WrongLogError: If a row is not what the model makes of the rows before it.
@@ -31,7 +31,12 @@ def audit(columns: Mapping[str, Sequence[Any]], constants: Mapping[str, Any]) ->
     auditor = _Auditor(Log(rows), constants)
     auditor.replay()
     uavs = [vars(u) for u in auditor.fleet.uavs]
-    return {"metrics": auditor.metrics(), "measured": auditor.measured(), "uavs": uavs}
+    return {
+        "metrics": auditor.metrics(),
+        "measured": auditor.measured(),
+        "uavs": uavs,
+        "nodes": auditor.nodes.records(),
+    }
 
 
 class _Auditor:
@@ -139,7 +144,7 @@ class _Auditor:
         found: dict[str, float] = {}
         packets, slots = self.nodes.packets, self.log.slot
         if self.c.get("age", {}).get("measured"):
-            found |= self.nodes.ages.metrics(slots)
+            found |= self.nodes.ages.metrics()
         if packets is not None:
             found |= packets.metrics()
         if packets is not None or "failures" in self.c:

@@ -24,6 +24,8 @@ class Nodes:
         self.residual: list[float] = []
         self.hidden, self.silent = [0.0] * len(self.cells), set[int]()
         self.initial = self.arrived = self.lost = 0.0
+        self.begun: list[float] = []  # the initial data of each node
+        self.gained, self.taken = [0.0] * len(self.cells), [0.0] * len(self.cells)
         self.ages = Ages(len(self.cells))
         self.loses = constants.get("failures", {}).get("node_data") == "lost"
         arrivals = constants.get("arrivals", {"process": "slotted"})
@@ -55,12 +57,29 @@ class Nodes:
             self.log.require(low <= amount <= high, "initial data out of range")
             self.residual.append(amount)
         self.initial = sum(self.residual)
+        self.begun = [*self.residual]
 
     def end(self) -> None:
         """Take the data that are left over from the log."""
         for k in range(len(self.cells)):
             self.residual[k] += self.hidden[k]
             self.take("mission_end", self.log.slot, k, value=self.residual[k])
+        self.ages.finish(self.log.slot)
+
+    def records(self) -> list[dict[str, float]]:
+        """What the record has of every node of a mission that has ended."""
+        end = self.log.slot
+        return [
+            {
+                "initial": self.begun[k],
+                "arrived": self.gained[k],
+                "collected": self.taken[k],
+                "residual": self.residual[k],
+                "age": self.ages.areas[k] / end,
+                "age_at_end": end - self.ages.newest[k],
+            }
+            for k in range(len(self.cells))
+        ]
 
     # --- communications ---
 
@@ -111,6 +130,7 @@ class Nodes:
         amount = min(length * self._efficiency(row.snr) * u.rate, self.residual[k])
         log.require(math.isclose(value, amount, rel_tol=1e-9), "its SNR has another rate")
         self.residual[k] -= value
+        self.taken[k] += value
         log.require(self.residual[k] >= 0, "more data than the node has")
         if self.residual[k] == 0 and self.packets is None:
             self.ages.fall(k, time, time)
@@ -175,6 +195,7 @@ class Nodes:
             self.take("arrival", self.log.slot, k, value=amount)
             self.log.require(self._is_made(amount, self.rates[k]), "no number of messages")
             self.residual[k] += amount
+            self.gained[k] += amount
             self.arrived += amount
             last = k
 
@@ -195,6 +216,7 @@ class Nodes:
             packets.check_rate(k, time, self.rates[k])
             now, gained = time, self.message
             self.arrived += self.message
+            self.gained[k] += self.message
             lost = packets.store(k, time, self.message)
             lost = number if k in self.silent and self.loses else lost
             if lost >= 0:

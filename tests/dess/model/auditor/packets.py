@@ -80,6 +80,7 @@ class Ages:
     def __init__(self, nodes: int):
         self.newest, self.fell = [0.0] * nodes, [0.0] * nodes
         self.teeth: list[tuple[float, float]] = []
+        self.areas = [0.0] * nodes
 
     def fall(self, node: int, time: float, generated: float) -> None:
         """Data of a node that were generated at that time have been collected."""
@@ -89,17 +90,22 @@ class Ages:
             self.newest[node], self.fell[node] = generated, time
 
     def _add_tooth(self, node: int, time: float) -> None:
-        self.teeth.append((self.fell[node] - self.newest[node], time - self.newest[node]))
+        low, high = self.fell[node] - self.newest[node], time - self.newest[node]
+        self.teeth.append((low, high))
+        self.areas[node] += (high - low) * (high + low) / 2
 
     def mean_at(self, time: float) -> float:
         """The mean age of all nodes at a time."""
         return time - sum(self.newest) / len(self.newest)
 
-    def metrics(self, end: float) -> dict[str, float]:
-        """What the record has of the ages of a mission that has ended."""
-        peaks = [high for _, high in self.teeth]
+    def finish(self, end: float) -> None:
+        """Add the last tooth of every node."""
         for node in range(len(self.newest)):
             self._add_tooth(node, end)
+
+    def metrics(self) -> dict[str, float]:
+        """What the record has of the ages of a mission that has ended (``finish``)."""
+        peaks = [high for _, high in self.teeth[: -len(self.newest)]]
         whole = sum(high - low for low, high in self.teeth)
         area = sum((high**2 - low**2) / 2 for low, high in self.teeth)
         found = {"age": area / whole, "age_p99": self._exceeded_for(0.01 * whole)}
