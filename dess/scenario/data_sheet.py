@@ -380,20 +380,35 @@ class DataSheet(Section):
         return {}
 
     def battery_of_type(self, kind: UavType) -> int:
-        """The battery of a type of UAVs when it is full, less the reserve [%]."""
-        share = Fraction(1)
-        if kind.endurance:
-            share = self._endurance_of_type(kind) / self._exact_endurance
-            if share > 1 + _NEGLIGIBLE:
-                problem = f"{shown(kind.endurance)} is longer than that of the data sheet"
-                raise InputError("endurance", problem, f"{self.endurance} at most")
-        return math.floor(100 * (share + _NEGLIGIBLE)) - self._reserved
+        """The battery of a type of UAVs when it is full, less its reserve [%]."""
+        share = self.share_of_type(kind)
+        if share > 1 + _NEGLIGIBLE:
+            problem = f"{shown(kind.endurance)} is longer than that of the data sheet"
+            raise InputError("endurance", problem, f"{self.endurance} at most")
+        reserve = exactly(self.reserve or "0 %", "percent")[0]
+        return math.floor((share + _NEGLIGIBLE) * (100 - reserve))
+
+    def share_of_type(self, kind: UavType) -> Fraction:
+        """The full battery of a type of UAVs, its reserve included, in terms of the sheet's."""
+        if not kind.endurance:
+            return Fraction(1)
+        return self._endurance_of_type(kind) / self._exact_endurance
 
     def charge_rate_of_type(self, kind: UavType) -> Fraction:
-        """The battery that a charging slot adds to a type of UAVs [%], exactly as it was typed."""
+        """What a charging slot adds to a type of UAVs, exactly as the times were typed.
+
+        A type that gives ``charging`` is charged in this time from its own empty to its own full;
+        others gain what the sheet says.
+
+        Returns:
+            The rate in percent of the battery of the sheet.
+        """
         if not kind.charging:
             return self.charge_rate
-        return self._exact_endurance / exactly(kind.charging, "s")[0]
+        endurance = self._exact_endurance
+        if kind.endurance:
+            endurance = self._endurance_of_type(kind)
+        return endurance / exactly(kind.charging, "s")[0]
 
     def _endurance_of_type(self, kind: UavType) -> Fraction:
         """The flying time of a type of UAVs at its cruising speed in still air [s]."""
@@ -425,11 +440,6 @@ class DataSheet(Section):
             problem = f"{shown(kind.cruise)} does not go into {self.cruise} a whole number of times"
             raise InputError("cruise", problem, " or ".join(nearest))
         return slots
-
-    @property
-    def _reserved(self) -> int:
-        """The battery that is never used [%]."""
-        return math.ceil(self.number("reserve") - 1e-9)
 
     @property
     def wing(self) -> RotaryWing:
@@ -524,7 +534,7 @@ class DataSheet(Section):
         Raises:
             InputError: If slots and cells are too coarse or too fine for the sheet.
         """
-        full = 100 - self._reserved
+        full = self.battery_of_type(UavType.off())
         self._slots("charging", _MOST_CHARGING)
         gain = self.charge_rate
         following: dict[str, Any] = {

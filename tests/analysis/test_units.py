@@ -12,7 +12,7 @@ from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts
 from dess.analysis.answers.fleet.risk import risk_sentence
-from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, rule_of_thumb
+from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, charging_slots, rule_of_thumb
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.ask import around, limits
 from dess.analysis.ask.answer import Answer
@@ -122,6 +122,16 @@ def test_the_rule_of_thumb_takes_its_numbers_from_the_missions_of_the_answer(sea
     assert rule.sentence(searched.scenario(best.points[0]).uavs[1]) in (
         search_of(searched).sentences()
     )
+
+
+def test_each_uav_is_charged_at_the_rate_of_its_type():
+    types = [{"endurance": "20 min", "charging": "10 min"}, {}]
+    space = load_scenario("jade-bight", uavs=2, fleet=types)
+    missions = {"point": [0], "uavs": [2], "flying_time": [100]}
+    uavs = {"charged": [20, 0], "battery": [37, 30]}
+    # 57 of 35 min are 20 min; 2 % a slot for what is charged in half of its flying time.
+    slots = charging_slots([space], missions, uavs)
+    assert slots == pytest.approx([(57 + 20 - 37) / 2, (100 - 30) / (35 / 40)])
 
 
 def test_the_rule_of_thumb_by_hand():
