@@ -693,6 +693,14 @@ class DataSheet(Section):
             (snr, factor * _LORA_CODING / (1 << factor)) for factor, snr in _LORA_SNR.items()
         )
 
+    def strongest_wind(self, direction: float) -> float:
+        """The strongest wind [m/s] from a direction [deg] in which all moves are possible.
+
+        It is rounded down to 0.01 m/s.
+        """
+        largest = largest_speed(self.number("cruise"), direction, self.number("max_speed"))
+        return _rounded_down(largest)
+
     def _check_speeds(self) -> None:
         """Refuse a largest airspeed below the cruising speed, and a wind that it cannot fly in."""
         if not self.max_speed:
@@ -704,7 +712,7 @@ class DataSheet(Section):
         if not self.wind:
             return
         wind, direction = measured(self.wind, "m/s from deg")
-        strongest = _rounded_down(largest_speed(cruise, direction, most))
+        strongest = self.strongest_wind(direction)
         if wind > strongest:
             fastest = _rounded_down(largest_speed(wind, direction, most))
             problem = f"is too strong for {self.cruise} over ground and {self.max_speed} in the air"
