@@ -3,39 +3,51 @@
     find_limits(results, "my-sea.toml")  # results of a search for the cheapest setting
     limit_sentences(results)
 
-Each condition is made harder until the fleet breaks a requirement, and its limit is found by
-bisection, on missions of the check of the fleet.
+Each condition is made harder until the fleet breaks a requirement, on missions of the check of the
+fleet. The limits of data and wind are found by bisection, and the wind comes from eight directions.
+Failures are rare: the means at any rate follow from missions without failures and from missions
+with many, each weighed by how likely it is at that rate.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
+from scipy.optimize import brentq
 
 from dess import InputError, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.ask.around import place_beside
-from dess.analysis.metrics import columns_in_units, metric_of
+from dess.analysis.metrics import NODES_BEHIND, columns_in_units, metric_of
 from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import values_within
+from dess.analysis.stats.differences import compare_pairs
+from dess.analysis.stats.intervals import values_within, worst_node
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
 from dess.base.files.writing import write_file
+from dess.model.record import Records
 from dess.policies.registry import is_path, load_team
-from dess.scenario.quantities import measured, times
+from dess.scenario.quantities import POINTS, measured, rounded, times
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
-MISSIONS = 30  # of the check, at most
+MISSIONS = 30  # of the check, at most; for failures three times as many
 CLOSE = 0.05  # the width of the last interval, as a share of its end
 MOST_DATA = 8.0  # times the data of the sheet
-FAILURES = 1 / 1000, 1.0  # the rarest and the most frequent that are tried [1/h of flying]
+LEAST_WIND = 0.5  # that is tried [m/s]
+PLACES = POINTS[::2]  # from which the wind comes
+FAILURES = 1 / 100_000, 1.0  # the rarest and the most frequent that are tried [1/h of flying]
 SHEET = "sheet"  # what ends a condition that the data sheet does not allow to be harder
+
+_RAREST = 1e-8  # failures that never happen [1/h of flying]
+_MORE_FAILURES = 3  # times as many as those that are borne
+_MORE_MISSIONS = 3  # times as many for failures
 
 # In the order in which conditions of equal hardness are told.
 _NAMES = {
@@ -51,7 +63,9 @@ class Limit(Document):
     Attributes:
         field: The field of the scenario.
         present: Its value in the scenario; empty if it has none.
-        last: The hardest value with which the fleet was found to meet its requirements.
+        last: The hardest value with which the fleet was found to meet its requirements, rounded to
+            what the missions tell.
+        is_rough: Whether they tell but one digit of it.
         harder: How many times as hard as at present this is; 0 if the scenario has no value.
         broken: The metric of the requirement that breaks beyond it; ``sheet`` if the data sheet
             allows no more, and empty if none breaks up to the hardest value that was tried.
@@ -62,6 +76,7 @@ class Limit(Document):
     last: str
     harder: float
     broken: str
+    is_rough: bool = False
 
 
 class Limits(Document):
@@ -139,55 +154,55 @@ def _shortest_number(value: float, low: float, high: float) -> float:
     return float(f"{value:.3g}")
 
 
-@dataclass
-class _Condition:
-    """A condition of a scenario that can be harder.
+@dataclass(frozen=True)
+class Trial:
+    """What is left of the requirements in a scenario, each as a share of its bound.
 
     Attributes:
-        field: The field.
-        present: Its value in the scenario, if there is one.
-        base: The hardness of this value; 0 if there is none.
-        search: The bisection over the hardness.
-        write: Writes a hardness as a value of the field.
-        end: What ends the condition at the largest hardness, if nothing breaks before.
+        margins: How far the mean of every metric is on the right side of its bound; empty if the
+            data sheet does not allow the scenario.
+        errors: Half the 95 % intervals of the changes of the means.
     """
 
-    field: str
-    present: Any
-    base: float
-    search: Bisection
-    write: Callable[[float], Any]
-    end: str = ""
+    margins: Mapping[str, float] = field(default_factory=dict)
+    errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def limit(self) -> Limit:
-        """What the search has found."""
-        search = self.search
-        harder = 0.0
-        if self.base:
-            harder = search.low / self.base
-        last = ""
-        if search.low > 0:
-            last = _in_words(self.write(search.low), search.low)
-        present = ""
-        if self.present:
-            present = _in_words(self.present, self.base)
-        return Limit(
-            field=self.field,
-            present=present,
-            last=last,
-            harder=harder,
-            broken=search.broken or self.end,
-        )
+    def room(self) -> float:
+        """The least margin."""
+        return min(self.margins.values(), default=-math.inf)
+
+    @property
+    def broken(self) -> str:
+        """The metric whose requirement breaks most; empty if all are kept."""
+        if not self.margins:
+            return SHEET
+        if self.room >= 0:
+            return ""
+        return min(self.margins, key=self.margins.__getitem__)
 
 
-def _in_words(value: Any, factor: float) -> str:
-    """A value of a field; of a list for the nodes, how many times the data of the sheet it is."""
-    if isinstance(value, str):
-        return value
-    if factor == 1:
-        return "what the sheet lists"
-    return f"{factor:.3g} times what the sheet lists"
+def _digits_of_limit(trials: Mapping[float, Trial], broken: str) -> int:
+    """The digits of a limit that trials tell, by the values at which a metric surely breaks or not.
+
+    Args:
+        trials: The trials of the values.
+        broken: The metric.
+    """
+    if broken in ("", SHEET):
+        return 3
+    kept = [0.0]
+    missed = [math.inf]
+    for value, trial in trials.items():
+        if broken in trial.margins:
+            margin, error = trial.margins[broken], trial.errors[broken]
+            if margin - error >= 0:
+                kept.append(value)
+            elif margin + error < 0:
+                missed.append(value)
+    if min(missed) - max(kept) <= 2 * CLOSE * min(missed) < math.inf:
+        return 2
+    return 1
 
 
 def place_of_limits(results: Results) -> Path:
@@ -222,7 +237,7 @@ def find_limits(
     fleet = _Fleet(results, scenario, workers, progress, missions)
     if not fleet.space.units or fleet.space.needs_events:
         return
-    broken = fleet.find_broken(fleet.checks)
+    broken = fleet.trial_of(fleet.checks).broken
     limits: tuple[Limit, ...] = ()
     if not broken:
         limits = tuple(sorted(_search_limits(fleet), key=_order_of))
@@ -237,18 +252,77 @@ def _order_of(limit: Limit) -> tuple[bool, float]:
 
 
 def _search_limits(fleet: "_Fleet") -> list[Limit]:
-    """The limits of all conditions, whose bisections are simulated together."""
-    conditions = [*_conditions_of(fleet)]
-    while next_values := [
-        (condition, value)
-        for condition in conditions
-        if (value := condition.search.value) is not None
-    ]:
-        changes = [{condition.field: condition.write(value)} for condition, value in next_values]
-        results = fleet.try_changes(changes)
-        for (condition, value), broken in zip(next_values, results, strict=True):
-            condition.search.learn(value, broken)
-    return [condition.limit for condition in conditions]
+    """The limits of all conditions that the data sheet of the fleet's scenario has."""
+    sheet = fleet.space.data_sheet
+    limits = [_find_most_failures(fleet)]
+    if sheet.data_rate:
+        limits.append(_find_most_data(fleet, sheet.data_rate))
+    if sheet.max_speed:
+        limits.append(_find_strongest_wind(fleet))
+    return limits
+
+
+class Flights(NamedTuple):
+    """Missions with a rate of failures.
+
+    Attributes:
+        rate: The rate [1/h of flying].
+        hours: (N,) how long all UAVs of a mission have flown together [h].
+        failures: (N,) how many of them have failed.
+        metrics: The metrics of the missions.
+    """
+
+    rate: float
+    hours: np.ndarray
+    failures: np.ndarray
+    metrics: pd.DataFrame
+
+    def values(self, column: str) -> np.ndarray:
+        """(N, K) the values of a metric: of all K nodes, or one of each mission."""
+        nodes = NODES_BEHIND.get(column)
+        if nodes is None:
+            return self.metrics[column].to_numpy(float)[:, None]
+        return np.stack(self.metrics[nodes].to_numpy())
+
+    def without(self, row: int) -> "Flights":
+        """All missions but one."""
+        hours, failures = (np.delete(values, row) for values in (self.hours, self.failures))
+        return Flights(self.rate, hours, failures, self.metrics.drop(index=row))
+
+
+@dataclass(frozen=True)
+class FailureModel:
+    """The means of metrics at any rate of failures.
+
+    A mission has no failure with probability exp(-rate * hours), and is then one of ``unfailed``.
+    If it has some, it is one of those of ``failing`` that have, weighed by their likelihood ratio.
+
+    Attributes:
+        unfailed: Missions without failures.
+        failing: The same missions with frequent failures.
+    """
+
+    unfailed: Flights
+    failing: Flights
+
+    def mean(self, column: str, rate: float) -> float:
+        """The mean of a metric at a rate [1/h of flying]; of the worst node, if it is of one."""
+        chances = np.exp(-rate * self.unfailed.hours)
+        means = np.mean(chances[:, None] * self.unfailed.values(column), axis=0)
+        has_failed = self.failing.failures > 0
+        if has_failed.any():
+            failures = self.failing.failures[has_failed]
+            hours = self.failing.hours[has_failed]
+            logarithms = failures * math.log(rate / self.failing.rate)
+            logarithms -= (rate - self.failing.rate) * hours
+            weights = np.exp(logarithms - logarithms.max())
+            values = self.failing.values(column)[has_failed]
+            means += (1 - chances.mean()) * np.average(values, axis=0, weights=weights)
+        return float(means[worst_node(means, column)])
+
+    def without(self, row: int) -> "FailureModel":
+        """The same without one of the missions."""
+        return FailureModel(self.unfailed.without(row), self.failing.without(row))
 
 
 class _Fleet:
@@ -275,7 +349,7 @@ class _Fleet:
         self.space = results.scenario(point)
         self.checks = checks[(checks["policy"] == best.policy) & (checks["point"] == point)]
         self.missions = min(missions, len(self.checks))
-        self._requirements = requirements_of(results)
+        self.requirements = requirements_of(results)
         self._scenario = scenario
         self._values = manifest.study.set | manifest.points[point].values
         self._seed = manifest.seed
@@ -291,107 +365,232 @@ class _Fleet:
         """
         return load_scenario(self._scenario, **(self._values | change))
 
-    def allows(self, change: dict[str, Any]) -> bool:
-        """Whether the data sheet allows a change, such as a wind against which UAVs can fly."""
-        try:
-            self.load(change)
-        except InputError:
-            return False
-        return True
+    def fly_with_failures(self, rate: float) -> Flights:
+        """The first missions of the check with a rate of failures [1/h of flying]."""
+        space = self.load({"data_sheet.mtbf": f"{1 / rate:.9f} h"})
+        missions = min(_MORE_MISSIONS * self.missions, len(self.checks))
+        [records] = self._fly_all([space], missions)
+        assert space.units
+        hours = records.uavs["slots_flying"].sum(axis=1) * space.units.slot / 3600
+        failures = records.operations["failures"].astype(float)
+        return Flights(rate, hours, failures, _table_of(space, records))
 
-    def try_changes(self, changes: Sequence[dict[str, Any]]) -> list[str]:
-        """What breaks with each of these changes of the scenario; empty where nothing does."""
+    def try_changes(self, changes: Sequence[dict[str, Any]]) -> list[Trial]:
+        """What is left of the requirements with each of these changes of the scenario."""
         spaces = {}
         for number, change in enumerate(changes):
-            if self.allows(change):
+            try:
                 spaces[number] = self.load(change)
+            except InputError:  # such as a wind against which UAVs cannot fly
+                continue
+        trials = [Trial()] * len(changes)
+        flown = self._fly_all([*spaces.values()], self.missions)
+        for (number, space), records in zip(spaces.items(), flown, strict=True):
+            trials[number] = self.trial_of(_table_of(space, records))
+        return trials
+
+    def _fly_all(self, spaces: Sequence[ScenarioSpace], missions: int) -> list[Records]:
+        """The first missions of the check in each of these scenarios."""
         records = simulate_batch(
-            [space for space in spaces.values() for _ in range(self.missions)],
+            [space for space in spaces for _ in range(missions)],
             self._team,
             self._seed,
-            [*range(CHECK, CHECK + self.missions)] * len(spaces),
+            [*range(CHECK, CHECK + missions)] * len(spaces),
             workers=self._workers,
             progress=self._progress,
         )
-        table = pd.DataFrame(records.missions).join(pd.DataFrame(records.operations))
-        table = table.assign(**columns_of_nodes(records))
-        broken = [SHEET] * len(changes)
-        for place, (number, space) in enumerate(spaces.items()):
-            rows = table[place * self.missions :][: self.missions]
-            assert space.units
-            in_units = columns_in_units(rows, space.units)
-            broken[number] = self.find_broken(rows.assign(**in_units))
-        return broken
+        firsts = range(0, missions * len(spaces), missions)
+        return [Records(*(part[first : first + missions] for part in records)) for first in firsts]
 
-    def find_broken(self, missions: pd.DataFrame) -> str:
-        """The metric whose requirement breaks most; empty if all are kept.
+    def trial_of(self, missions: pd.DataFrame) -> Trial:
+        """What is left of the requirements in missions that are those of the check, but changed.
 
         The means are those of the whole check, changed by the differences from the missions of the
         check with the same random numbers.
         """
-        room = {}
-        for requirement in self._requirements:
+        changes = {}
+        errors = {}
+        for requirement in self.requirements:
             column = requirement.column
-            whole, same, changed = (
-                values_within(rows, column, ()).mean()
-                for rows in (self.checks, self.checks[: len(missions)], missions)
-            )
-            mean = whole + changed - same
-            room[column] = float(requirement.margin(mean)) / abs(requirement.bound)
-        worst = min(room, key=room.__getitem__)
-        if room[worst] >= 0:
-            return ""
-        return worst
+            changed = values_within(missions, column, ())
+            same = values_within(self.checks[: len(changed)], column, ())
+            changes[column] = float(changed.mean() - same.mean())
+            pairs = compare_pairs(changed, same, metric=column)
+            error = pairs.student
+            if requirement.metric.is_outcome:  # with the failures that were not seen
+                error = (pairs.high - pairs.low) / 2
+            errors[column] = error / abs(requirement.bound)
+        return Trial(self.margins_after(changes), errors)
+
+    def margins_after(self, changes: Mapping[str, float]) -> dict[str, float]:
+        """What is left of the requirements if the means of the check change, as shares of them."""
+        margins = {}
+        for requirement in self.requirements:
+            column = requirement.column
+            mean = values_within(self.checks, column, ()).mean()
+            margin = requirement.margin(mean + changes[column])
+            margins[column] = float(margin) / abs(requirement.bound)
+        return margins
 
 
-def _conditions_of(fleet: _Fleet) -> Iterator[_Condition]:
-    """The conditions that the data sheet of a scenario has."""
+def _table_of(space: ScenarioSpace, records: Records) -> pd.DataFrame:
+    """The metrics of missions, in the units of the data sheet."""
+    assert space.units
+    table = pd.DataFrame(records.missions).join(pd.DataFrame(records.operations))
+    table = table.assign(**columns_of_nodes(records))
+    return table.assign(**columns_in_units(table, space.units))
+
+
+def _find_most_data(fleet: _Fleet, rate: str | tuple[str, ...]) -> Limit:
+    """The most data for which the fleet is good enough, up to ``MOST_DATA`` times the sheet's."""
+
+    def multiply(factor: float) -> Any:
+        if isinstance(rate, str):
+            return times(rate, factor)
+        return [times(rate_of_node, factor) for rate_of_node in rate]
+
+    search = Bisection(1.0, MOST_DATA)
+    trials = {}
+    while (factor := search.value) is not None:
+        [trials[factor]] = fleet.try_changes([{"data_sheet.data_rate": multiply(factor)}])
+        search.learn(factor, trials[factor].broken)
+    digits = _digits_of_limit(trials, search.broken)
+    present = "what the sheet lists"
+    last = present
+    if isinstance(rate, str):
+        present = rate
+        last = max(rate, rounded(multiply(search.low), digits), key=_bits_per_second)
+    elif search.low > 1:
+        last = f"{rounded(f'{search.low:g} times', digits)} what the sheet lists"
+    return Limit(
+        field="data_sheet.data_rate",
+        present=present,
+        last=last,
+        harder=search.low,
+        broken=search.broken,
+        is_rough=digits == 1,
+    )
+
+
+def _bits_per_second(rate: str) -> float:
+    return measured(rate, "bit/s")[0]
+
+
+def _find_strongest_wind(fleet: _Fleet) -> Limit:
+    """The strongest wind for which the fleet is good enough, from the worst of ``PLACES``.
+
+    It is no stronger than what UAVs can fly in from all of them.
+    """
     sheet = fleet.space.data_sheet
-    rate = sheet.data_rate
-    if rate:
-
-        def write_rate(factor: float) -> Any:
-            if isinstance(rate, str):
-                return times(rate, factor)
-            return [times(rate_of_node, factor) for rate_of_node in rate]
-
-        yield _Condition("data_sheet.data_rate", rate, 1.0, Bisection(1.0, MOST_DATA), write_rate)
-    if sheet.max_speed:
-        yield _wind_of(fleet)
-    base = 0.0
-    if sheet.mtbf:
-        base = 3600 / measured(sheet.mtbf, "s")[0]
-    rarest, most = FAILURES
-    search = Bisection(base, max(most, 2 * base), rarest)
-    yield _Condition("data_sheet.mtbf", sheet.mtbf, base, search, _write_failures)
-
-
-def _write_failures(per_hour: float) -> str:
-    """A rate of failures as the mean time between them."""
-    return f"{float(f'{1 / per_hour:.3g}'):g} h"
-
-
-def _wind_of(fleet: _Fleet) -> _Condition:
-    """The wind, from where it comes at present, up to the strongest that the sheet can fly."""
-    sheet = fleet.space.data_sheet
-    calm = f"{sheet.cruise} from W"
-    speed = 0.0
+    strongest = {
+        place: sheet.strongest_wind(360 / len(PLACES) * number)
+        for number, place in enumerate(PLACES)
+    }
+    worst = min(strongest, key=strongest.__getitem__)
+    search = Bisection(0.0, strongest[worst], LEAST_WIND)
+    places = PLACES
+    trials = {}
+    while (speed := search.value) is not None:
+        winds = [{"data_sheet.wind": f"{speed:g} m/s from {place}"} for place in places]
+        found = dict(zip(places, fleet.try_changes(winds), strict=True))
+        hardest = min(places, key=lambda place: found[place].room)
+        trials[speed] = found[hardest]
+        search.learn(speed, trials[speed].broken)
+        if trials[speed].broken:  # wind from the other places may be stronger than this
+            places = [place for place in places if found[place].broken]
+            worst = hardest
+    digits = _digits_of_limit(trials, search.broken)
+    last = ""
+    if search.low > 0:
+        last = rounded(f"{search.low:g} m/s from {worst}", digits)
+    harder = 0.0
     if sheet.wind:
-        speed, _ = measured(sheet.wind, "m/s from deg")
-    place = (sheet.wind or calm).partition(" from ")[2]
+        present, _ = measured(sheet.wind, "m/s from deg")
+        harder = search.low / max(present, 0.01)
+    return Limit(
+        field="data_sheet.wind",
+        present=sheet.wind or "",
+        last=last,
+        harder=harder,
+        broken=search.broken or SHEET,
+        is_rough=digits == 1,
+    )
 
-    def write(metres_per_second: float) -> str:
-        return f"{metres_per_second:.4g} m/s from {place}"
 
-    strongest = speed
-    step = 64.0
-    while step >= 0.01:
-        if fleet.allows({"data_sheet.wind": write(strongest + step)}):
-            strongest += step
-        step /= 2
-    strongest = math.floor(100 * strongest) / 100
-    search = Bisection(speed, max(strongest, speed))
-    return _Condition("data_sheet.wind", sheet.wind, speed, search, write, SHEET)
+def _find_most_failures(fleet: _Fleet) -> Limit:
+    """The most frequent failures for which the fleet is good enough."""
+    sheet = fleet.space.data_sheet
+    present = _RAREST
+    if sheet.mtbf:
+        present = 3600 / measured(sheet.mtbf, "s")[0]
+    least = max(FAILURES[0], present)
+    most = min(max(FAILURES[1], 2 * present), 3600 / sheet.units.slot)
+
+    def trial(model: FailureModel, rate: float) -> Trial:
+        changes = {}
+        for requirement in fleet.requirements:
+            column = requirement.column
+            changes[column] = model.mean(column, rate) - model.mean(column, present)
+        return Trial(fleet.margins_after(changes))
+
+    unfailed = fleet.fly_with_failures(_RAREST)
+    rate = min(max(1 / max(unfailed.hours.mean(), _RAREST), 2 * least), most)  # one in a mission
+    model = FailureModel(unfailed, fleet.fly_with_failures(rate))
+    while rate < most and trial(model, rate).room >= 0:
+        rate = min(_MORE_FAILURES * rate, most)
+        model = FailureModel(unfailed, fleet.fly_with_failures(rate))
+
+    limit = rate
+    broken = trial(model, rate).broken
+    digits = 3
+    last = ""
+    if trial(model, least).room < 0:
+        limit = least
+        broken = trial(model, least).broken
+        if sheet.mtbf:
+            last = sheet.mtbf
+    else:
+        if broken:
+            exponent = brentq(
+                lambda exponent: trial(model, math.exp(exponent)).room,
+                math.log(least),
+                math.log(rate),
+            )
+            limit = math.exp(exponent)
+            broken = trial(model, 1.001 * limit).broken
+            digits = _digits_of_rate(model, broken, limit)
+        last = rounded(f"{1 / limit:.6g} h", digits, is_up=True)
+        if sheet.mtbf:
+            last = min(last, sheet.mtbf, key=_seconds)
+    harder = 0.0
+    if sheet.mtbf:
+        harder = limit / present
+    return Limit(
+        field="data_sheet.mtbf",
+        present=sheet.mtbf or "",
+        last=last,
+        harder=harder,
+        broken=broken,
+        is_rough=digits == 1,
+    )
+
+
+def _digits_of_rate(model: FailureModel, broken: str, rate: float) -> int:
+    """The digits that missions tell of the rate at which a metric breaks, by the jackknife."""
+    missions = len(model.unfailed.hours)
+    means = [model.without(row).mean(broken, rate) for row in range(missions)]
+    error = 1.96 * np.std(means) * math.sqrt(missions - 1)
+    change = 0.01  # of the rate
+    slope = (model.mean(broken, (1 + change) * rate) - model.mean(broken, rate)) / change
+    if error <= 0.2 * CLOSE * abs(slope):
+        return 3
+    if error <= 2 * CLOSE * abs(slope):
+        return 2
+    return 1
+
+
+def _seconds(time: str) -> float:
+    return measured(time, "s")[0]
 
 
 def limits_of(results: Results) -> Limits | None:
@@ -416,7 +615,9 @@ def limit_sentences(results: Results) -> list[str]:
         return [f"In its check, the {name} breaks its requirement, so that no limits were sought."]
     first, *others = document.limits
     missions = numbers.format_count(document.missions, "mission")
-    method = f"Limits are found by bisection to 5 % on {missions} of the check."
+    method = (
+        f"Limits are found on {missions} of the check, that of failures on three times as many."
+    )
     if first.broken:
         start = f"What breaks it first is {_NAMES[first.field]}"
     else:
@@ -435,17 +636,22 @@ def _limit_in_words(limit: Limit) -> str:
     else:
         form = "{}"
     if limit.last:
-        bears = f"up to {form.format(limit.last)}"
+        about = ""
+        if limit.is_rough:
+            about = "about "
+        bears = f"up to {about}{form.format(limit.last)}"
+        if limit.field == "data_sheet.wind":
+            bears = f"{bears}, the worst of {len(PLACES)} directions"
     elif limit.field == "data_sheet.wind":
-        bears = "none at all"
+        bears = f"not even {LEAST_WIND:g} m/s"
     else:
-        bears = f"not even {form.format(_write_failures(FAILURES[0]))}"
+        bears = f"not even {form.format(f'{1 / FAILURES[0]:g} h')}"
     if limit.present:
         assumed = f"{limit.present} is assumed"
     else:
         assumed = "none is assumed"
     if limit.broken == SHEET:
-        end = "in more wind, the UAVs of the data sheet cannot fly"
+        end = "in more wind from there, the UAVs of the data sheet cannot fly"
     elif limit.broken:
         end = f"beyond it, the {metric_of(limit.broken).within} breaks its requirement"
     else:

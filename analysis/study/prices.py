@@ -291,10 +291,12 @@ class Costs(StrictTable):
         of_uavs = self._prices_of_fleets(spaces, points, fleet)
         amounts = {PURCHASE: self.purchase_of(of_uavs, pads[points])}
         if self.years is not None:
+            emptied = np.zeros(len(fleet))
             if price_of_battery:  # the recharge after the mission is paid for, too
-                charged = spent_battery(spaces, missions, uavs)
-            packs = charged / 100 / self.pack_cycles
-            amounts[PACKS] = self.paid_missions * self.pack * packs
+                spent = spent_battery(spaces, missions, uavs)
+                charged = np.bincount(mission, spent, len(fleet))
+                emptied = np.bincount(mission, spent / _full_packs(spaces, missions), len(fleet))
+            amounts[PACKS] = self.paid_missions * self.pack * emptied / self.pack_cycles
         return amounts | {
             "charging": self.paid_missions * self.charge * charged / 100,
             "hours": self.paid_missions * self.hour * hours,
@@ -352,27 +354,50 @@ def most_battery_per_slot(space: ScenarioSpace) -> float:
 def spent_battery(
     spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
 ) -> np.ndarray:
-    """(n,) the battery that the UAVs of a mission have spent in the air [%].
+    """(u,) the battery that each UAV has spent in the air [%].
 
-    It is what they had at the start and what was charged, without what is left at the end.
+    It is what it had at the start and what was charged, without what is left at the end.
 
     Args:
         spaces: The scenario of every design point.
         missions: As in ``Costs.parts``.
         uavs: As in ``Costs.parts``.
     """
-    fleet = np.asarray(missions["uavs"])
-    mission = np.repeat(np.arange(len(fleet)), fleet)
-    number = np.arange(len(mission)) - np.repeat(np.cumsum(fleet) - fleet, fleet)
-    most = max(space.uavs[1] for space in spaces)
-    types = np.stack([types_of(space, most) for space in spaces])
-    types = types[np.asarray(missions["point"])[mission], number]
-    drawn = np.asarray(missions["flying_time"])[mission]
+    types = types_of_uavs(spaces, missions)
+    drawn = np.repeat(np.asarray(missions["flying_time"]), np.asarray(missions["uavs"]))
     start = np.where(types["battery"] > 0, types["battery"], drawn)
     limit = types["charge_complete"].astype(np.int64)
     start = np.where(limit > 0, np.minimum(start, limit), start)
-    spent = start + np.asarray(uavs["charged"]) - np.asarray(uavs["battery"])
-    return np.bincount(mission, spent, len(fleet))
+    return start + np.asarray(uavs["charged"]) - np.asarray(uavs["battery"])
+
+
+def types_of_uavs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) -> np.ndarray:
+    """(u,) records of ``dess.model.state.types_of`` of the UAVs of all missions.
+
+    Args:
+        spaces: The scenario of every design point.
+        missions: As in ``Costs.parts``.
+    """
+    most = max(space.uavs[1] for space in spaces)
+    return np.stack([types_of(space, most) for space in spaces])[_places_of_uavs(missions)]
+
+
+def _full_packs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) -> np.ndarray:
+    """(u,) the full battery of each UAV, its reserve included [%]."""
+    most = max(space.uavs[1] for space in spaces)
+    packs = np.full((len(spaces), most), 100.0)
+    for point, space in enumerate(spaces):
+        if space.units:
+            kinds = [type_of(space.fleet, uav) for uav in range(most)]
+            packs[point] = [100 * float(space.data_sheet.share_of_type(kind)) for kind in kinds]
+    return packs[_places_of_uavs(missions)]
+
+
+def _places_of_uavs(missions: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """(u,) the design points of the UAVs of all missions, and their numbers in their missions."""
+    fleet = np.asarray(missions["uavs"])
+    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+    return np.repeat(np.asarray(missions["point"]), fleet), np.arange(fleet.sum()) - first
 
 
 def stranded_uavs(uavs: Mapping[str, Any]) -> np.ndarray:

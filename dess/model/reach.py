@@ -169,9 +169,10 @@ def _slots_of_trips(space: ScenarioSpace, uav: int) -> np.ndarray:
 
 
 def _full_battery(space: ScenarioSpace, uav: int) -> int:
-    """The battery of a charged UAV [%]."""
+    """The most battery with which a UAV leaves a zone [%]: at the start, or when it is charged."""
     kind = fleet.type_of(space.fleet, uav)
-    full = kind.flying_time or max(space.charge_complete)
+    start = kind.flying_time or max(space.flying_time)
+    full = max(start, *space.charge_complete)
     return min(full, space.battery_of_type(kind) or full)
 
 

@@ -42,6 +42,8 @@ from dess.physics.landing import flies, has_finished, is_over, lands, next_latch
 from dess.physics.radio import is_below_steps
 from dess.physics.section import for_sections
 
+CRUMB = 1e-9  # a rest of data below this share of what a UAV has just collected is none
+
 
 @kernel
 def launch(state, b, starts, number, replication):
@@ -336,6 +338,8 @@ def communicate(
         if node < 0 or is_below_steps(mission, snr):
             continue
         amount = min(channel.rate(mission, snr) * u.rate, residual[node])
+        if _leaves_crumb(mission, residual[node], amount):
+            amount = residual[node]
         residual[node] -= amount
         _count_collected(mission, sensors[node], amount)
         if residual[node] == 0.0:
@@ -351,6 +355,15 @@ def communicate(
 @for_sections
 def _count_collected(mission, sensor, amount):
     sensor.collected += amount
+
+
+@for_sections
+def _leaves_crumb(mission, data, amount):
+    """Whether what an amount leaves of the data is due to rounding, as three times 0.3 does of 0.9.
+
+    This happens where rates have steps or a largest value. Without sections it has no chance.
+    """
+    return data - amount < CRUMB * amount
 
 
 @kernel

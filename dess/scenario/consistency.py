@@ -252,9 +252,14 @@ def _unfit_types(c: Fields) -> Iterator[InputError]:
             allowed = "a data_sheet, or flying_time and slots_per_cell in place of units"
             yield InputError(f"fleet.{number}.{in_units[0]}", "needs a data sheet", allowed)
             return
-        full = c.battery_of_type(kind)
+        if not c.data_sheet.is_on:
+            continue
+        full = c.data_sheet.battery_of_type(kind)
         start = np.max(c.value("charge_start"))
-        if full is not None and full <= start:
+        if kind.flying_time is not None and kind.flying_time > full:
+            problem = f"{kind.flying_time} is more than the reserve leaves"
+            yield InputError(f"fleet.{number}.flying_time", problem, str(full))
+        if kind.endurance is not None and full <= start:
             problem = f"{shown(kind.endurance)} is {full} % of a battery, less the reserve"
             allowed = f"more than charge_start, {start} %"
             yield InputError(f"fleet.{number}.endurance", problem, allowed)

@@ -390,20 +390,35 @@ class DataSheet(Section):
         return {}
 
     def battery_of_type(self, kind: UavType) -> int:
-        """The battery of a type of UAVs when it is full, less the reserve [%]."""
-        share = Fraction(1)
-        if kind.endurance:
-            share = self._endurance_of_type(kind) / self._exact_endurance
-            if share > 1 + _NEGLIGIBLE:
-                problem = f"{shown(kind.endurance)} is longer than that of the data sheet"
-                raise InputError("endurance", problem, f"{self.endurance} at most")
-        return math.floor(100 * (share + _NEGLIGIBLE)) - self._reserved
+        """The battery of a type of UAVs when it is full, less its reserve [%]."""
+        share = self.share_of_type(kind)
+        if share > 1 + _NEGLIGIBLE:
+            problem = f"{shown(kind.endurance)} is longer than that of the data sheet"
+            raise InputError("endurance", problem, f"{self.endurance} at most")
+        reserve = exactly(self.reserve or "0 %", "percent")[0]
+        return math.floor((share + _NEGLIGIBLE) * (100 - reserve))
+
+    def share_of_type(self, kind: UavType) -> Fraction:
+        """The full battery of a type of UAVs, its reserve included, in terms of the sheet's."""
+        if not kind.endurance:
+            return Fraction(1)
+        return self._endurance_of_type(kind) / self._exact_endurance
 
     def charge_rate_of_type(self, kind: UavType) -> Fraction:
-        """The battery that a charging slot adds to a type of UAVs [%], exactly as it was typed."""
+        """What a charging slot adds to a type of UAVs, exactly as the times were typed.
+
+        A type that gives ``charging`` is charged in this time from its own empty to its own full;
+        others gain what the sheet says.
+
+        Returns:
+            The rate in percent of the battery of the sheet.
+        """
         if not kind.charging:
             return self.charge_rate
-        return self._exact_endurance / exactly(kind.charging, "s")[0]
+        endurance = self._exact_endurance
+        if kind.endurance:
+            endurance = self._endurance_of_type(kind)
+        return endurance / exactly(kind.charging, "s")[0]
 
     def _endurance_of_type(self, kind: UavType) -> Fraction:
         """The flying time of a type of UAVs at its cruising speed in still air [s]."""
@@ -435,11 +450,6 @@ class DataSheet(Section):
             problem = f"{shown(kind.cruise)} does not go into {self.cruise} a whole number of times"
             raise InputError("cruise", problem, " or ".join(nearest))
         return slots
-
-    @property
-    def _reserved(self) -> int:
-        """The battery that is never used [%]."""
-        return math.ceil(self.number("reserve") - 1e-9)
 
     @property
     def wing(self) -> RotaryWing:
@@ -534,7 +544,7 @@ class DataSheet(Section):
         Raises:
             InputError: If slots and cells are too coarse or too fine for the sheet.
         """
-        full = 100 - self._reserved
+        full = self.battery_of_type(UavType.off())
         self._slots("charging", _MOST_CHARGING)
         gain = self.charge_rate
         following: dict[str, Any] = {
@@ -722,6 +732,14 @@ class DataSheet(Section):
         sent = most + _LORAWAN_HEADER
         return self._lora_rate(factor) / self._lora_rate(factor, sent) * sent / most
 
+    def strongest_wind(self, direction: float) -> float:
+        """The strongest wind [m/s] from a direction [deg] in which all moves are possible.
+
+        It is rounded down to 0.01 m/s.
+        """
+        largest = largest_speed(self.number("cruise"), direction, self.number("max_speed"))
+        return _rounded_down(largest)
+
     def _check_speeds(self) -> None:
         """Refuse a largest airspeed below the cruising speed, and a wind that it cannot fly in."""
         if not self.max_speed:
@@ -733,7 +751,7 @@ class DataSheet(Section):
         if not self.wind:
             return
         wind, direction = measured(self.wind, "m/s from deg")
-        strongest = _rounded_down(largest_speed(cruise, direction, most))
+        strongest = self.strongest_wind(direction)
         if wind > strongest:
             fastest = _rounded_down(largest_speed(wind, direction, most))
             problem = f"is too strong for {self.cruise} over ground and {self.max_speed} in the air"

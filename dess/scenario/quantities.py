@@ -7,6 +7,7 @@
 
 import re
 from collections.abc import Iterator
+from decimal import ROUND_DOWN, ROUND_UP, Context
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import NoReturn
@@ -216,10 +217,25 @@ def spellings(unit: str) -> Iterator[tuple[str, ...]]:
 
 def times(text: str, factor: float) -> str:
     """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
+    number, rest = _split(text)
+    return f"{float(number) * factor:g} {rest}"
+
+
+def rounded(text: str, digits: int, is_up: bool = False) -> str:
+    """A quantity, or the first of two, rounded down (or up) to so many significant digits."""
+    number, rest = _split(text)
+    direction = ROUND_DOWN
+    if is_up:
+        direction = ROUND_UP
+    return f"{float(Context(digits, direction).create_decimal(number)):g} {rest}"
+
+
+def _split(text: str) -> tuple[str, str]:
+    """The number of a quantity, or of the first of two, and what follows it."""
     amount, *others = re.split(r"(?= from | at )", " ".join(text.split()), maxsplit=1)
     match = _NUMBER.fullmatch(amount)
     assert match
-    return f"{float(match[1].replace(',', '.')) * factor:g} {match[2]}{''.join(others)}"
+    return match[1].replace(",", "."), f"{match[2]}{''.join(others)}"
 
 
 def refuse(value: object, problem: str, units: str, allowed: str = "") -> NoReturn:

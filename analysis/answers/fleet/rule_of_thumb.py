@@ -9,13 +9,17 @@ take the place of what an engineer would estimate.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from dess.analysis import numbers
 from dess.analysis.results.tables import Results
-from dess.analysis.study.prices import spent_battery
+from dess.analysis.study.prices import spent_battery, types_of_uavs
 from dess.scenario.quantities import printed
+from dess.scenario.scenario import ScenarioSpace
 
 
 @dataclass(frozen=True)
@@ -103,8 +107,7 @@ def rule_of_thumb(results: Results, policy: str, points: Sequence[int]) -> RuleO
         return None
     space = scenarios[points[0]]
     assert space.units
-    spent = spent_battery(scenarios, missions, uavs).sum() / flights
-    charge = spent / float(space.charge_fraction)
+    charge = charging_slots(scenarios, missions, uavs).sum() / flights
     wait = uavs["slots_waiting"].sum() / flights
     flown = uavs["slots_flying"].sum()
     return RuleOfThumb(
@@ -112,3 +115,21 @@ def rule_of_thumb(results: Results, policy: str, points: Sequence[int]) -> RuleO
         flight=float(flown / flights * space.units.slot),
         recovery=float((charge + wait) * space.units.slot),
     )
+
+
+def charging_slots(
+    spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
+) -> np.ndarray:
+    """(u,) the slots in which what each UAV has spent is charged, by the rate of its type.
+
+    Args:
+        spaces: The scenario of every design point.
+        missions: As in ``Costs.parts``.
+        uavs: As in ``Costs.parts``.
+    """
+    types = types_of_uavs(spaces, missions)
+    points = np.repeat(np.asarray(missions["point"]), np.asarray(missions["uavs"]))
+    rates = np.array([float(space.charge_fraction) for space in spaces])[points]
+    has_own = types["charge_rate"] > 0
+    rates[has_own] = types["charge_rate"][has_own] / types["rate_slots"][has_own]
+    return spent_battery(spaces, missions, uavs) / rates

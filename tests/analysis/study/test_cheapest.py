@@ -86,7 +86,14 @@ def test_the_battery_that_a_small_type_has_spent_counts_from_its_own():
     spaces = [ScenarioSpace.of(uavs=2, fleet=[{"endurance": "20 min"}, {}], data_sheet=sheet)]
     missions = {"point": [0], "uavs": [2], "flying_time": [100]}
     uavs = {"charged": [20, 0], "battery": [45, 30]}
-    assert spent_battery(spaces, missions, uavs).tolist() == [50 + 20 - 45 + 100 - 30]
+    assert spent_battery(spaces, missions, uavs).tolist() == [50 + 20 - 45, 100 - 30]
+    # They wear half of a pack's cycle and 0.7 of one, but are charged by the same energy.
+    missions["slots"] = [300]
+    uavs["down"] = [0, 0]
+    prices = Costs(charge=2, pack=30, pack_cycles=200, years=1, days=10)
+    parts = prices.parts(spaces, missions, uavs)
+    assert parts["packs"] == pytest.approx([10 * 30 * (25 / 50 + 0.7) / 200])
+    assert parts["charging"] == pytest.approx([10 * 2 * (0.25 + 0.7)])
 
 
 def test_without_interest_a_price_is_paid_in_equal_parts():

@@ -46,11 +46,12 @@ def constants_of(space: ScenarioSpace) -> dict[str, Any]:
 def _type_in_slots(kind: UavType, sheet: DataSheet) -> dict[str, Any]:
     """A type of UAVs in percent and slots, computed from its times in minutes and its speed."""
     fields = kind.model_dump()
+    endurance = _number(kind.endurance or sheet.endurance)
     if kind.endurance:
-        full = 100 * _number(kind.endurance) / _number(sheet.endurance)
-        fields["full"] = int(full - _number(sheet.reserve or "0 %"))
+        above_reserve = 100 - _number(sheet.reserve or "0 %")
+        fields["full"] = int(endurance / _number(sheet.endurance) * above_reserve)
     if kind.charging:
-        fields["charge_rate"] = _number(sheet.endurance) / _number(kind.charging)
+        fields["charge_rate"] = endurance / _number(kind.charging)
     if kind.cruise:
         fields["slots_per_cell"] = round(_number(sheet.cruise) / _number(kind.cruise))
     return fields

@@ -53,6 +53,21 @@ def test_a_node_is_out_of_reach_where_no_trip_leads_into_its_range(sheet, cells,
     assert len(reach.margins) == cells - guarded
 
 
+@pytest.mark.parametrize(
+    ("values", "cells"),
+    [
+        ({"fleet": [{"flying_time": 40}]}, 49),  # it is charged to 100 %
+        ({"charge_complete": 60}, 49),  # it starts with 100 %
+        ({"fleet": [{"flying_time": 70}], "charge_complete": 60}, 34),
+        ({"flying_time": 50, "charge_complete": 60}, 29),
+        ({"fleet": [{"endurance": "28 min"}], "charge_complete": 60}, 39),  # 80 %
+    ],
+)
+def test_a_full_battery_is_the_larger_one_of_start_and_charge(values, cells):
+    space = _space(**values)
+    assert _farthest(reach_of_nodes(space).lost, space) == cells + CELLS_IN_RANGE
+
+
 def test_a_uav_flies_that_far_and_no_farther():
     space = _space()
     home = {}

@@ -39,14 +39,15 @@ def _power(airspeed: float) -> float:
 @pytest.mark.parametrize(
     ("kind", "reserve", "full", "rate"),
     [
-        ({"endurance": "20 min"}, "0 %", 50, Fraction(40, 55)),
-        ({"endurance": "20 min", "charging": "25 min"}, "10 %", 40, Fraction(40, 25)),
-        ({"endurance": "33 min", "charging": "70 min"}, "0 %", 82, Fraction(40, 70)),
+        ({"endurance": "20 min"}, "0 %", 50, Fraction(40, 55)),  # by the charger of the sheet
+        ({"endurance": "20 min", "charging": "25 min"}, "10 %", 45, Fraction(20, 25)),
+        ({"endurance": "33 min", "charging": "70 min"}, "0 %", 82, Fraction(33, 70)),
+        ({"endurance": "25 min", "charging": "30 min"}, "15 %", 53, Fraction(25, 30)),
         ({"charging": "70 min"}, "0 %", 100, Fraction(40, 70)),
     ],
 )
 def test_a_type_starts_with_its_battery_and_charges_to_it(kind, reserve, full, rate):
-    """20 of 40 min are 50 %; a charging slot of 24 s adds 24 s of the charging time."""
+    """20 of 40 min are 50 %, of which a charging slot of 24 s adds 24 s of the charging time."""
     space = _space(kind, sheet={"reserve": reserve})
     _, log = flown(space, THERE_AND_BACK + "." * 40)
     levels = batteries(log)
@@ -118,11 +119,11 @@ def test_a_scenario_is_stored_and_changed_by_the_units_of_its_types():
 def test_what_follows_for_each_type_is_told():
     space = _space({"endurance": "20 min", "charging": "25 min", "cruise": "7.5 m/s"}, sheet=WIND)
     [facts] = sheet_facts(space)["types"]
-    assert facts["battery"] == 50 and facts["charge_rate"] == 1.6 and facts["slots_per_cell"] == 2
+    assert facts["battery"] == 50 and facts["charge_rate"] == 0.8 and facts["slots_per_cell"] == 2
     north = math.ceil(1000 * _power(12.5) / _power(7.5)) / 1000
     assert facts["battery_per_slot"]["north"] == north
     line = next(line for line in sheet_lines(space) if line.startswith("type 1"))
-    assert "50 % of a full battery" in line and "adds 1.6 %" in line and "2 slots" in line
+    assert "50 % of a full battery" in line and "adds 0.8 %" in line and "2 slots" in line
 
 
 def test_the_reach_is_that_of_the_type():
@@ -178,17 +179,21 @@ def test_a_uav_that_may_not_leave_its_zone_stays_and_others_fly_around_it():
         ({"charging": "9 s"}, "'9 s' is less than a slot of 24 s; allowed: 24 s or more"),
         ({"charging": "90 h"}, "'90 h' is 13,500 slots of 24 s; allowed: 2.778 d at most"),
         ({"endurance": "9 min", "flying_time": 9}, "flying_time: is given beside endurance"),
+        (
+            {"flying_time": 95},
+            "fleet.1.flying_time: 95 is more than the reserve leaves; allowed: 90",
+        ),
         ({"cruise": "5 m/s", "slots_per_cell": 3}, "slots_per_cell: is given beside cruise"),
         (
             {"endurance": "12 min"},
-            "fleet.1.endurance: '12 min' is 30 % of a battery, less the reserve; "
+            "fleet.1.endurance: '12 min' is 27 % of a battery, less the reserve; "
             "allowed: more than charge_start, 30 %",
         ),
     ],
 )
 def test_what_a_type_cannot_be_is_refused(kind, message):
     with pytest.raises(InputError) as raised:
-        _space({}, kind)
+        _space({}, kind, sheet={"reserve": "10 %"})
     assert message in str(raised.value) and "\n" not in str(raised.value)
 
 
