@@ -6,6 +6,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, usable_battery
+from dess.model.guard.matching import is_tight, match_zones
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.model.ways_home import is_calm
@@ -112,6 +113,11 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         return _nearest(uavs[i], chart)
     for j in range(mission.uavs):
         memory.plan.turns[j].zone = -1
+    if lands(mission) and is_tight(mission, chart):
+        match_zones(mission, uavs, chart, memory.plan.turns, reach)
+        home = _choose(mission, uavs, i, chart, memory, reach)
+        gives_way = np.int64(0 <= uavs[i].zone != memory.plan.turns[i].zone)
+        return Home(home.x, home.y, home.cells, home.wait, home.begins, gives_way)
     if not may_wait(mission, uavs, data):
         return _choose(mission, uavs, i, chart, memory, reach)
     wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
