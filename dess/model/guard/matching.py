@@ -14,7 +14,8 @@ import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import dearest_slot, late_slots, margin, margin_slots, usable_battery
-from dess.model.guard.ways import battery_of_way
+from dess.model.guard.queues import needs_pad
+from dess.model.guard.ways import battery_of_way, is_parked
 from dess.physics.chart import distance
 from dess.physics.landing import lands
 
@@ -36,13 +37,18 @@ def is_tight(mission, chart):
 
 @inlined
 def keeps_cell(mission, u):
-    """Whether a UAV in a zone stays in its cell, whatever teammates need."""
-    return u.zone >= 0 and (u.charging or u.pad_request >= 0 or u.grounded)
+    """Whether a UAV stays in its cell of a zone, whatever teammates need.
+
+    One that only stands there flies on if a teammate needs the cell.
+    """
+    if not lands(mission):
+        return is_parked(mission, u)
+    return u.active and u.zone >= 0 and (u.charging or u.pad_request >= 0 or u.grounded)
 
 
 @shared_kernel
-def match_zones(mission, uavs, chart, turns, reach):
-    """Match the active UAVs to zones; the zone of each is written into its ``TURN``.
+def match_zones(mission, uavs, data, chart, plan, reach):
+    """Match the UAVs that must charge to zones; the zone of each is written into its ``TURN``.
 
     Each UAV begins in the zone that is best for it. While a zone has more UAVs than cells, one of
     them goes to another zone, and if this is full, one of that zone goes on from there, and so on:
@@ -52,16 +58,17 @@ def match_zones(mission, uavs, chart, turns, reach):
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
+        data: Residual data of all nodes together [data units].
         chart: ``Chart``.
-        turns: (I,) ``TURN`` records.
+        plan: ``Plan``; the zones are written into it.
         reach: The table of ``reach_of``.
     """
     prices = np.full((mission.uavs, mission.zones), _NO_WAY, np.int64)
     left = chart.sizes[: mission.zones].copy()  # the cells that are left in each zone
     for j in range(mission.uavs):
-        u, turn = uavs[j], turns[j]
+        u, turn = uavs[j], plan.turns[j]
         turn.zone, turn.asks = -1, 0
-        if not u.active or (u.grounded and u.zone < 0):
+        if not needs_pad(mission, u, data):
             continue
         if keeps_cell(mission, u):
             turn.zone = u.zone
@@ -70,7 +77,8 @@ def match_zones(mission, uavs, chart, turns, reach):
             turn.zone = np.argmin(prices[j])
         left[turn.zone] -= 1
     for zone in range(mission.zones):
-        while left[zone] < 0 and _move_on(mission, turns, prices, left, zone):
+        plan.queues[zone].change = 0
+        while left[zone] < 0 and _move_on(mission, plan.turns, prices, left, zone):
             left[zone] += 1
 
 
