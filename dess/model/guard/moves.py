@@ -142,7 +142,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
-    if charge and (u.pad_request >= 0 or (lands(mission) and is_parked(mission, u))):
+    stands = lands(mission) and is_parked(mission, u) and home.gives_way == 0
+    if charge and (u.pad_request >= 0 or stands):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + dearest_slot(mission) * home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those

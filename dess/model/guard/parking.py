@@ -6,6 +6,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, usable_battery
+from dess.model.guard.matching import is_tight, keeps_cell, match_zones
 from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.model.ways_home import is_calm
@@ -113,7 +114,12 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
     for j in range(mission.uavs):
         memory.plan.turns[j].zone = -1
     if not may_wait(mission, uavs, data):
-        return _choose(mission, uavs, i, chart, memory, reach)
+        if not is_tight(mission, chart):
+            return _choose(mission, uavs, i, chart, memory, reach)
+        match_zones(mission, uavs, data, chart, memory.plan, reach)
+        home = _choose(mission, uavs, i, chart, memory, reach)
+        gives_way = np.int64(0 <= uavs[i].zone != memory.plan.turns[i].zone)
+        return Home(home.x, home.y, home.cells, home.wait, home.begins, gives_way)
     wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
     home = _choose(mission, uavs, i, chart, memory, reach)
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
@@ -173,21 +179,25 @@ def _choose(mission, uavs, i, chart, memory, reach):
     Returns:
         The ``Home``, without waits; the UAV's own cell if all are taken.
     """
-    u, taken = uavs[i], memory.taken
+    u, taken, turns = uavs[i], memory.taken, memory.plan.turns
+    are_matched = is_tight(mission, chart)
     taken[:] = _FREE
     for j in range(mission.uavs):
         o = uavs[j]
         memory.planned[j] = -1
         if not o.active or o.zone < 0:
             continue
-        stands = j == i or is_parked(mission, o) or waits_in_zone(mission, o)
-        keeps = stands or not is_crowded(mission, chart, o.zone)
+        keeps = _has_cell(mission, o, are_matched) or not is_crowded(mission, chart, o.zone)
+        if not are_matched:
+            keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
-    for place in range(_sort(mission, uavs, memory.plan.turns, memory.order)):
+    for place in range(_sort(mission, uavs, turns, memory.order)):
         j = memory.order[place]
         o = uavs[j]
-        if j != i and (o.grounded or is_parked(mission, o)):
+        if j != i and (o.grounded or _has_cell(mission, o, are_matched)):
             continue
+        if j != i and are_matched and turns[j].zone < 0:
+            continue  # it needs no cell
         cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
         if j == i:
             if cell < 0:
@@ -197,6 +207,14 @@ def _choose(mission, uavs, i, chart, memory, reach):
             taken[cell] = _TAKEN
             memory.planned[j] = cell
     return stays(u)
+
+
+@inlined
+def _has_cell(mission, u, are_matched):
+    """Whether a UAV keeps its cell, and chooses none."""
+    if are_matched:
+        return keeps_cell(mission, u)
+    return is_parked(mission, u)
 
 
 @inlined
@@ -221,7 +239,10 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     is_in_reach = cell >= 0 and (not lands(mission) or spent < usable_battery(mission, u))
     is_in_reach = is_in_reach and late_slots(mission, cells * u.slots_per_cell + 1) == 0
     if not is_in_reach and (zone >= 0 or lands(mission)):
-        cell, cells, spent = _best_cell(mission, uavs, i, -1, _OCCUPIED, chart, memory, reach)
+        only, most = np.int64(-1), _OCCUPIED
+        if zone >= 0 and memory.plan.queues[zone].change > 0:
+            only, most = zone, _TAKEN  # it waits outside until a teammate has left its cell
+        cell, cells, spent = _best_cell(mission, uavs, i, only, most, chart, memory, reach)
     return cell, cells
 
 

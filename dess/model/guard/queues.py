@@ -40,6 +40,8 @@ from dess.scenario.fields import MOST_ZONES
 LACKING, SPARE = 64, 4
 # The slots that a UAV keeps for delays of those who are charged before it.
 KEPT = 2
+# The slots in which a UAV leaves its cell of a full zone, and the next one takes it.
+CHANGE = 2
 
 # The orders in which a zone may charge the UAVs that come to it: as they ask; of those that wait,
 # the one with the earliest deadline; by their deadlines, though a pad is idle until one comes.
@@ -62,8 +64,15 @@ TURN = np.dtype(
     ]
 )
 
-# The queue of one zone: the order in which it charges UAVs, and what its plan costs.
-QUEUE = np.dtype([("order", np.int64), ("price", np.int64)])
+# The queue of one zone.
+QUEUE = np.dtype(
+    [
+        ("order", np.int64),  # in which it charges UAVs
+        ("price", np.int64),  # what its plan costs
+        # The slots between two UAVs on a pad: where not all have a cell, the next one waits outside.
+        ("change", np.int64),
+    ]
+)
 
 
 class Plan(NamedTuple):
@@ -116,12 +125,12 @@ def may_wait(mission, uavs, data):
         return False
     count = 0
     for j in range(mission.uavs):
-        count += _needs_pad(mission, uavs[j], data)
+        count += needs_pad(mission, uavs[j], data)
     return count > fewest
 
 
 @inlined
-def _needs_pad(mission, u, data):
+def needs_pad(mission, u, data):
     """Whether a UAV charges, has asked for a pad, or will have to."""
     return u.active and not u.grounded and (u.pad_request >= 0 or must_charge(mission, u, data))
 
@@ -146,7 +155,7 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
     for j in range(mission.uavs):
         u, turn = uavs[j], plan.turns[j]
         turn.zone = -1
-        if not _needs_pad(mission, u, data):
+        if not needs_pad(mission, u, data):
             continue
         if u.pad_request >= 0:
             turn.zone = u.zone
@@ -267,6 +276,7 @@ def _price(mission, uavs, chart, zone, plan):
         if not u.latch:
             turn.asks += _slots_to_charge_start(mission, battery_left(mission, u) - spent)
     plan.queues[zone].order = _AS_ASKED
+    plan.queues[zone].change = CHANGE if count > chart.sizes[zone] else 0
     least = _serve(mission, uavs, zone, _AS_ASKED, plan)
     if asked or count < 2:
         return least
@@ -275,7 +285,7 @@ def _price(mission, uavs, chart, zone, plan):
             price = _serve(mission, uavs, zone, order, plan)
             if price < least:
                 least, plan.queues[zone].order = price, order
-    return least + LACKING * max(count - chart.sizes[zone], 0)
+    return least
 
 
 @shared_kernel
@@ -289,6 +299,7 @@ def _serve(mission, uavs, zone, order, plan):
         plan.turns[j].begins, plan.turns[j].pad = -1, -1
         if uavs[j].charging and busy < pads:
             plan.turns[busy].free = _charging_time(mission, uavs[j], zone, uavs[j].battery)
+            plan.turns[busy].free += plan.queues[zone].change
             plan.turns[j].pad = busy
             busy += 1
         else:
@@ -307,6 +318,7 @@ def _serve(mission, uavs, zone, order, plan):
         plan.turns[j].begins, plan.turns[j].pad = begins, pad
         if pad >= 0:
             plan.turns[pad].free = begins + _time_on_pad(mission, uavs, j, begins, plan)
+            plan.turns[pad].free += plan.queues[zone].change
         lacks = begins - plan.turns[j].deadline
         price += LACKING * max(lacks, 0) + max(lacks + SPARE, 0)
         left -= 1
@@ -382,6 +394,7 @@ def _latest(mission, uavs, i, plan):
         if following < 0:
             return latest
         charging += _time_on_pad(mission, uavs, before, plan.turns[before].begins, plan)
+        charging += plan.queues[plan.turns[i].zone].change
         latest = min(latest, plan.turns[following].deadline - KEPT - charging)
         before = following
 
@@ -404,12 +417,14 @@ def _following(mission, j, plan):
 def _gives_way(mission, uavs, i, plan):
     """Whether UAV ``i`` must not ask now: a UAV that the plan has before it would come after it."""
     zone = plan.turns[i].zone
-    if plan.queues[zone].order == _AS_ASKED or plan.turns[i].asks > 0 or uavs[i].zone != zone:
+    is_full = plan.queues[zone].change > 0  # one that does not leave its cell keeps others out
+    is_asking = plan.queues[zone].order != _AS_ASKED and plan.turns[i].asks <= 0
+    if uavs[i].zone != zone or not (is_full or is_asking):
         return False
     for j in range(mission.uavs):
         begins_first = plan.turns[j].zone == zone and plan.turns[j].begins < plan.turns[i].begins
         has_asked = uavs[j].pad_request >= 0
         asks_after = plan.turns[j].asks > 0 or (j > i and not mission.lowest_battery_first)
-        if begins_first and asks_after and not has_asked:
+        if begins_first and (asks_after or is_full) and not has_asked:
             return True
     return False
