@@ -366,7 +366,10 @@ def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
 
 def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
     """The metric of a column of missions of a scenario space, with its range and its nodes."""
-    metric = metric_for_length(column, space.max_slots, space.units, space.uavs[1])
+    slots = space.max_slots
+    if metric_of(column).is_wait:
+        slots = longest_wait(space)
+    metric = metric_for_length(column, slots, space.units, space.uavs[1])
     if column in NODES_BEHIND:
         return replace(metric, among=len(space.nodes))
     return metric

@@ -97,7 +97,9 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
         assert row["gb"] == pytest.approx(gb)
         assert row["cost_per_gb"] == pytest.approx(best.cost / gb)
     text = search_of(results).sentence()
-    assert f"for {best.cost:,.0f} EUR a year: {parts['purchase']:,.0f} EUR for the purchase" in text
+    ends = f"[{row['cost_low']:,.0f}, {row['cost_high']:,.0f}]"
+    cost = f"for {best.cost:,.0f} EUR a year {ends}"
+    assert f"{cost}: {parts['purchase']:,.0f} EUR for the purchase" in text
     assert f"(battery packs {parts['packs']:,.0f} EUR and hours {parts['hours']:,.0f} EUR)" in text
     assert "for 200 missions (" in text
     assert f"{best.cost / gb:,.0f} EUR per GB collected" in text

@@ -176,9 +176,11 @@ class FleetAnswer:
     def _ends_of_cost_in_words(self) -> str:
         """The interval of the mean cost, to follow it; empty if it is the same in all missions."""
         selected = self.fleets[self.fleets["selected"]]
-        written = metric_of(COST).written(*selected[interval_columns(COST)].iloc[0])
-        _, space, ends = written.partition(" ")
-        return space + ends
+        estimate, *ends = selected[interval_columns(COST)].iloc[0]
+        if ends[0] == ends[1]:
+            return ""
+        _, interval = metric_of(COST).written(estimate, *ends).split(" ", 1)
+        return f" {interval}"
 
     @property
     def _where(self) -> str:

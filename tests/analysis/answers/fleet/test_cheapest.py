@@ -1,15 +1,19 @@
 """The answer of a search for the cheapest fleet: its table, sentences and guarantee."""
 
+from types import SimpleNamespace
+
 import pandas as pd
 import pytest
 
 from dess.analysis import numbers, run_study
 from dess.analysis.answers import summary
+from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
-from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
+from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.answers.settings.baseline import compare_with_baseline
+from dess.analysis.metrics import COST, RATIO, metric_of
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import level_after, share_interval
 from dess.analysis.study.study import CHECK
@@ -214,6 +218,26 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     assert search.best.fleet == one
     # One UAV is the least of all.
     assert "Of the values" not in search.reason_sentences()[0]
+
+
+def test_the_lead_figure_is_of_the_condition_that_decides(monkeypatch):
+    """The same fleet is needed under both; chance has made it more expensive where it has room."""
+    rows = pd.DataFrame(
+        {
+            "policy": "greedy",
+            "condition": ["calm", "calm", "storm", "storm"],
+            "fleet": ["1 UAV", "2 UAVs"] * 2,
+            "point": range(4),
+            RATIO: [0.70, 0.95, 0.60, 0.82],
+            COST: [1000.4, 2000.5, 1000.2, 2000.1],
+        }
+    )
+    monkeypatch.setattr(cheapest, "judge_settings", lambda _: rows)
+    ratio = Requirement(metric_of(RATIO), 0.8)
+    monkeypatch.setattr(cheapest, "requirements_of", lambda _: [ratio])
+    search = cheapest.FleetSearch(SimpleNamespace())
+    search.__dict__["best"] = SimpleNamespace(policy="greedy", points=(1, 3))
+    assert search.deciding_requirement() == (ratio, "storm")
 
 
 def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):

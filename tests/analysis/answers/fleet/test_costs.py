@@ -9,6 +9,8 @@ from dess.analysis.answers.fleet.costs import (
     mean_cost_parts,
     priced_settings,
 )
+from dess.analysis.metrics import metric_in_missions
+from dess.analysis.stats.intervals import interval_of
 from dess.analysis.stats.verdict import on_front
 
 PRICES = {"uav": 1000, "pad": 100, "charge": 2, "hour": 6, "lost_uav": 1000}
@@ -31,6 +33,29 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
         assert rows["on_front"].tolist() == expected.tolist()
         assert rows["probability"].between(0, 1).all()
         assert rows["probability"].sum() >= 1
+
+
+def test_a_cost_lies_between_the_purchase_and_the_loss_of_all_uavs(fixed):
+    missions = fixed.missions
+    uavs, pads = missions["uavs"], missions["pads"]
+    assert missions["least_cost"].tolist() == (1000 * uavs + 100 * pads).tolist()
+    # Of 5 missions, each lasts for all of its slots of a minute, in which every UAV is in the air.
+    slots = missions["most_slots"]
+    running = 5 * (uavs * (1000 + 2 * slots / 100) + 6 * slots / 60)
+    assert (missions["most_cost"] - missions["least_cost"]).tolist() == pytest.approx([*running])
+    assert missions["cost"].between(missions["least_cost"], missions["most_cost"]).all()
+
+
+def test_the_interval_of_a_mean_cost_is_that_of_its_own_fleet(fixed):
+    """No fleet costs less than its own purchase, whatever the others cost."""
+    table = priced_settings(fixed)
+    purchase = 1000 * table["uavs"] + 100 * table["pads"]
+    assert (table["cost_low"] >= purchase).all()
+    for row in table.itertuples():
+        missions = fixed.missions_of(row.policy)
+        missions = missions[missions["point"] == row.point]
+        expected = interval_of(metric_in_missions(missions, "cost"), missions["cost"].to_numpy())
+        assert (row.cost, row.cost_low, row.cost_high) == pytest.approx(tuple(expected))
 
 
 def test_bad_questions_get_one_line(fixed, studied):
