@@ -98,7 +98,7 @@ def intervals_of_means(
     success = printed[SUCCESS]
     ratio = printed[RATIO]
     of_product = success * (variance + ratio**2) - (success * ratio) ** 2
-    quantile = -stdtrit(missions - 1, (1 - LEVEL) / 2)
+    quantile = -float(stdtrit(missions - 1, (1 - LEVEL) / 2))
     found = exact(printed)
     found[SUCCESS] = interval_of_share(success, missions)
     for metric, spread in ((RATIO, variance), (PRODUCT, of_product)):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis.answers.summary import plot_by_fleet, plot_performance
-from dess.analysis.figures import comparison
+from dess.analysis.figures import comparison, style
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 
 
@@ -60,3 +60,18 @@ def test_a_panel_per_fleet_shows_products_and_the_bound():
         assert bound.get_xdata()[0] == rows[BOUND].iloc[0]
         assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two"]
     assert figure.axes[1].get_title(loc="left").startswith("2 UAVs: bound")
+
+
+def test_a_bar_is_dark_as_far_as_the_missions_tell_and_pale_beyond():
+    """Student's interval, and the whole one; where nothing is added, both are the same."""
+    rows = pd.DataFrame(
+        {"policy": ["a", "b"], "difference": [0.014, -0.2], "student": [0.002, 0.1]}
+        | {"low": [-0.01, -0.3], "high": [0.04, -0.1]}
+    )
+    (ax,) = comparison.plot_differences(rows, pd.Series(["product"] * 2), "A - B").axes
+    bars = [bar.lines[2][0] for bar in ax.containers]
+    ends = np.array([bar.get_segments()[0][:, 1] for bar in bars])
+    assert ends == pytest.approx(
+        np.array([[-0.01, 0.04], [0.012, 0.016], [-0.3, -0.1], [-0.3, -0.1]])
+    )
+    assert [bar.get_alpha() for bar in bars] == [style.PALE, None, style.PALE, None]

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis import compare
+from dess.analysis import compare, load_study, run_study
+from dess.analysis.answers import summary
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.answers.settings.effects import (
     BINS,
@@ -22,7 +23,8 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.answers.settings.ranking import best_settings_sentence, rank_settings
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.analysis.stats.verdict import SEEN_BEST, SEEN_WORSE, TIED, WORSE, may_be_best
+from dess.analysis.stats.verdict import BEST, SEEN_BEST, SEEN_WORSE, TIED, WORSE, may_be_best
+from dess.reports import cli
 from tests.analysis.small import grid
 
 
@@ -225,3 +227,55 @@ def test_varied_fields_have_their_values_in_order(results, studied):
     assert varied_values(single) == {} and main_effects(single).empty
     assert points_in_words(single) == [""]
     assert setting_in_words(single, "greedy", 0) == "greedy"
+
+
+SELECTED = """
+scenario = "paper"
+policies = ["greedy"]
+seed = 7
+[set]
+uavs = 3
+[design]
+kind = "grid"
+values.charge_start = [10, 30, 50]
+values.charge_complete = [60, 100]
+[selection]
+procedure = "kn"
+metric = "reward"
+first = 20
+indifference = 10
+budget = 5000
+check = 20
+"""
+
+
+def test_a_study_with_a_selection_has_one_best_setting_its_own(tmp_path, capsys):
+    """Settings that are ruled out after 20 missions have higher means than the selected one."""
+    (tmp_path / "select.toml").write_text(SELECTED)
+    results = run_study(load_study(tmp_path / "select.toml"), tmp_path / "out")
+    best = results.choice("greedy").best
+    means = results.missions.groupby("point")["reward"].mean()
+    assert means.idxmax() != best
+    table = rank_settings(results, "reward")
+    assert (table["point"].iloc[0], table["tied"].sum()) == (best, 1)
+    assert {*table["standing"][1:]} == {WORSE}
+    counts = results.missions.groupby("point").size()
+    assert counts.nunique() > 1
+    wide = results.missions.pivot(index="replication", columns="point", values="reward")
+    leads = wide.sub(wide[best], axis=0).mean()  # on common replications
+    assert leads[table["point"][1:]].is_monotonic_decreasing
+    said = best_settings_sentence(results, table, "reward")
+    assert f"C_S {results.store.manifest.points[best].values['charge_start']}" in said
+    assert "All 5 others are ruled out by the selection." in said
+    assert (
+        average_over_others(results, ["charge_start", "charge_complete"], "reward").loc[
+            best, "standing"
+        ]
+        == BEST
+    )
+    selected = summary.selection_table(results)
+    assert selected.cells["Reward"].iloc[0].startswith(f"{means[best]:,.0f} [")
+    assert selected.caption.endswith("by reward")
+    assert cli.main(["study", "show", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("Reward") >= 3 and f"{means[best]:,.0f} [" in printed
