@@ -6,7 +6,7 @@ intervals; statistics that have no formula are bootstrapped.
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial, reduce
+from functools import reduce
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -275,8 +275,8 @@ class Moments(NamedTuple):
         if measure.is_outcome and self._are_outcomes:
             return share_interval(int(self.total), self.n, level)
         if measure.allows_for_ends:
-            ends = ends_in_range(measure, self.mean, self.squares / self.n, self.n, level)
-            return Interval(self.mean, *map(float, ends))
+            low, high = ends_in_range(measure, self.mean, self.squares / self.n, self.n, level)
+            return Interval(self.mean, float(low), float(high))
         mean, *ends = self.skewed(level)
         return Interval(mean, *np.clip(ends, *measure.range).tolist())
 
@@ -560,22 +560,20 @@ def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) ->
         metric: The metric.
         spaces: The columns that tell the spaces apart, such as ``point``.
     """
-    if NODES_BEHIND.get(metric) in missions:
+    is_of_node = NODES_BEHIND.get(metric) in missions
+    if is_of_node:
         values = np.empty(len(missions))
-        adjust = partial(_values_of_worst_node, missions, metric)
     else:
         values = missions[metric].to_numpy(float).copy()
         if "uavs" not in missions:
             return values
-        fleets = missions["uavs"].to_numpy()
-
-        def adjust(rows: np.ndarray) -> np.ndarray:
-            return post_stratified(values[rows], fleets[rows])
-
     table = missions[[*spaces]].reset_index(drop=True)
     for _, part in group_rows(table, spaces):
         rows = part.index.to_numpy()
-        values[rows] = adjust(rows)
+        if is_of_node:
+            values[rows] = _values_of_worst_node(missions, metric, rows)
+        else:
+            values[rows] = post_stratified(values[rows], missions["uavs"].to_numpy()[rows])
     return values
 
 
