@@ -63,6 +63,7 @@ ANSWERED = (
     *("simulate --policy ddqn", "evaluate --policy any --policy ddqn-paper --missions 2"),
     *("study run trial.toml --out trial", "study show trial"),
     "sweep --scenario small.toml --set uavs=1,2 --missions 3",
+    "verify trial --missions 2",
 )
 MISSED = {
     "train quick --out run": ("dess train needs PyTorch", "learning"),
@@ -102,7 +103,7 @@ def test_a_plain_installation_has_the_simulator_and_its_commands(folder, plain):
 @pytest.mark.slow
 @pytest.mark.brief
 def test_a_sweep_answers_without_its_page(plain):
-    _, out, err = plain[ANSWERED[-1]]
+    _, out, err = plain[next(line for line in ANSWERED if line.startswith("sweep"))]
     assert "rank" in out and "page: " not in out
     assert err.splitlines()[-1].startswith("no page: the page of a sweep needs ")
     assert err.endswith(": pip install '.[reports]' -c constraints.txt")

@@ -23,6 +23,7 @@ from dess.analysis.execution.jobs import (
 )
 from dess.analysis.execution.workers import Here, Pool
 from dess.analysis.metrics import (
+    METRICS,
     NODES_BEHIND,
     RECORDED,
     columns_in_units,
@@ -33,6 +34,7 @@ from dess.analysis.results.chunks import split_into_chunks
 from dess.analysis.results.manifest import Cell, Part
 from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import Moments
 from dess.base.errors import check_type
 from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
@@ -48,6 +50,9 @@ MEMORY = 2**24
 # By metric, or the metric and a node, and by number of UAVs.
 Key = str | tuple[str, int]
 ByFleet = dict[Key, dict[int, Moments]]
+# Of how many missions the values are kept by which policies are compared: some 50 MB.
+MOST_COMPARED = 1_000_000
+_COMPARED = ["replication", "uavs", *METRICS]
 
 
 class Asked(NamedTuple):
@@ -96,6 +101,8 @@ class Evaluation(NamedTuple):
         seconds: Time of the simulation [s], without compilation and the start of workers; nan where
             results are kept, of which some may have been there.
         records: The records of the missions; None if only their moments are kept.
+        compared: What policies are compared by, a row per mission; None of more than
+            ``MOST_COMPARED`` missions.
     """
 
     policy: str
@@ -103,6 +110,7 @@ class Evaluation(NamedTuple):
     uav_slots: int
     seconds: float
     records: Records | None = None
+    compared: pd.DataFrame | None = None
 
 
 def evaluate(
@@ -161,16 +169,20 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
     moments: ByFleet = {}
     uav_slots, seconds = 0, 0.0
     records: Records | None = None
+    values: list[pd.DataFrame] = []
     pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
     for records, took in _simulate_pieces(asked, pieces, progress):
         _add_to_moments(moments, _metric_values(records, asked.scenario), records.missions["uavs"])
+        if asked.missions <= MOST_COMPARED:
+            values.append(pd.DataFrame(records.missions[_COMPARED]))
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
     kept = None
     if size >= asked.missions:
         kept = records
     over_space = _over_space(moments, asked.scenario, asked.missions)
-    return Evaluation(asked.team, over_space, uav_slots, seconds, kept)
+    compared = pd.concat(values, ignore_index=True) if values else None
+    return Evaluation(asked.team, over_space, uav_slots, seconds, kept, compared)
 
 
 def of_results(results: Results) -> list[Evaluation]:
@@ -185,8 +197,23 @@ def of_results(results: Results) -> list[Evaluation]:
         moments: ByFleet = {}
         _add_to_moments(moments, metrics | _values_by_node(rows), rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))
-        evaluations.append(Evaluation(str(team), over_space, int(rows["uav_slots"].sum()), nan))
+        uav_slots = int(rows["uav_slots"].sum())
+        evaluation = Evaluation(str(team), over_space, uav_slots, nan, compared=rows[_COMPARED])
+        evaluations.append(evaluation)
     return evaluations
+
+
+def compare_with_first(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
+    """Every other team compared with the first one, mission by mission.
+
+    Returns:
+        A row per team and metric of ``METRICS``, as ``dess.analysis.compare`` returns it; empty if
+        there is one team, or the values of the missions were not kept.
+    """
+    tables = [e.compared.assign(policy=e.policy) for e in evaluations if e.compared is not None]
+    if len(tables) < 2 or len(tables) < len(evaluations):
+        return pd.DataFrame()
+    return compare(pd.concat(tables), evaluations[0].policy, [*METRICS])
 
 
 def _add_to_moments(

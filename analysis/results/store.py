@@ -48,7 +48,7 @@ from dess.analysis.results.manifest import (
 )
 from dess.analysis.stats.intervals import worst_node
 from dess.analysis.study.prices import PURCHASE
-from dess.analysis.study.study import Study
+from dess.analysis.study.study import CHECK, Study
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import (
     check_folder,
@@ -314,6 +314,17 @@ class Store:
             parts: The parts.
         """
         return _absent_parts(parts, self._present[kind])
+
+    def begun(self, team: int) -> list[Part]:
+        """The missions that every cell of a team has, up to the first one that it lacks."""
+        parts = []
+        for cell in self.manifest.cells[team]:
+            whole = range(cell.first, CHECK)
+            gaps = gaps_between(whole, self._present["missions"][cell.key])
+            present = range(cell.first, gaps[0].start)
+            if present:
+                parts.append(Part(cell, present))
+        return parts
 
     def work(self) -> Work:
         """What there is to do."""

@@ -332,6 +332,28 @@ def results_of(store: Store) -> Results:
     return Results(store, all_missions, _of_policies(uavs), all_checks, bounds)
 
 
+def load_begun(out: str | Path) -> Results:
+    """Load what there is of a study that was interrupted, or still runs.
+
+    Returns:
+        The missions of every policy and design point up to the first one that is missing, and their
+        UAVs; no checks and no bounds. What was selected is not known.
+
+    Raises:
+        InputError: If it is not a results folder, or it has no missions yet.
+    """
+    store = Store.read(out)
+    missions, uavs = {}, {}
+    for number, team in enumerate(store.manifest.policies):
+        if parts := store.begun(number):
+            missions[team.policy] = store.missions(parts)
+            uavs[team.policy] = store.uavs(parts)
+    if not missions:
+        raise InputError(store.folder, "has no missions yet", "run the study again to complete it")
+    table = _label_missions(store.manifest, missions)
+    return Results(store, table, _of_policies(uavs), table[:0], {})
+
+
 def _with_gaps(missions: pd.DataFrame, bounds: Mapping[Place, Bound]) -> pd.DataFrame:
     """The missions with their bounds, and how far each is below its bound."""
     places = zip(missions["point"], missions["replication"], strict=True)
@@ -358,13 +380,13 @@ def _label_missions(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) ->
 def _swept_fields(manifest: Manifest) -> dict[str, list[Any]]:
     """The fields that the design sets and no record has, by design point.
 
-    Values are JSON text where some of them are lists, and None where a point does not set a field.
+    A field that a point does not set has the value of the scenario. Values are JSON text where some
+    of them are lists.
     """
-    designs = [point.values for point in manifest.points]
-    names = dict.fromkeys(name for design in designs for name in design)
+    designs = manifest.values
     swept = {}
-    for name in [name for name in names if name not in (MISSION_RECORD.names or ())]:
-        values = [design.get(name) for design in designs]
+    for name in [name for name in designs[0] if name not in (MISSION_RECORD.names or ())]:
+        values = [design[name] for design in designs]
         listed = any(isinstance(value, list) for value in values)
-        swept[name] = [json.dumps(v) if listed and v is not None else v for v in values]
+        swept[name] = [json.dumps(v) if listed else v for v in values]
     return swept

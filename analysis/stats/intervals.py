@@ -6,7 +6,7 @@ intervals; statistics that have no formula are bootstrapped.
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial, reduce
+from functools import reduce
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -600,22 +600,20 @@ def values_within(missions: pd.DataFrame, metric: str, spaces: Sequence[str]) ->
         metric: The metric.
         spaces: The columns that tell the spaces apart, such as ``point``.
     """
-    if NODES_BEHIND.get(metric) in missions:
+    is_of_node = NODES_BEHIND.get(metric) in missions
+    if is_of_node:
         values = np.empty(len(missions))
-        adjust = partial(_values_of_worst_node, missions, metric)
     else:
         values = missions[metric].to_numpy(float).copy()
         if "uavs" not in missions:
             return values
-        fleets = missions["uavs"].to_numpy()
-
-        def adjust(rows: np.ndarray) -> np.ndarray:
-            return post_stratified(values[rows], fleets[rows])
-
     table = missions[[*spaces]].reset_index(drop=True)
     for _, part in group_rows(table, spaces):
         rows = part.index.to_numpy()
-        values[rows] = adjust(rows)
+        if is_of_node:
+            values[rows] = _values_of_worst_node(missions, metric, rows)
+        else:
+            values[rows] = post_stratified(values[rows], missions["uavs"].to_numpy()[rows])
     return values
 
 

@@ -13,9 +13,12 @@ from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from dess.analysis.execution.evaluation import Evaluation
 
 app = typer.Typer()
+_DIFFERENCE = ["difference", "low", "high", "p", "p_adjusted", "n"]
 
 
 @options.add_command(app)
@@ -35,6 +38,8 @@ def evaluate(
 ) -> None:
     """Simulate many missions and print the means of their metrics with 95 % intervals.
 
+    Several policies fly the same missions; each is compared with the first one.
+
     Args:
         policy: A policy, or several that the UAVs follow in turn; repeatable.
         missions: Number of missions (replications 0, 1, ...).
@@ -43,7 +48,12 @@ def evaluate(
         out: Keep the missions in this results folder, which dess study show and dess report read;
             with more missions, those that are there are not simulated again.
     """
-    from dess.analysis.execution.evaluation import Asked, check_evaluation, estimate_means
+    from dess.analysis.execution.evaluation import (
+        Asked,
+        check_evaluation,
+        compare_with_first,
+        estimate_means,
+    )
     from dess.analysis.metrics import metric_in_space
     from dess.analysis.study.study import engine_of
     from dess.model.record import measures_of
@@ -88,10 +98,17 @@ def evaluate(
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
         for evaluation in evaluations
     ]
+    differences = compare_with_first(evaluations)
+    for row in rows if len(differences) else ():
+        of_policy = differences[differences["policy"] == row["policy"]].set_index("metric")
+        if len(of_policy):
+            row["against"] = rows[0]["policy"]
+            row["differences"] = of_policy[_DIFFERENCE].to_dict("index")
     if as_json:
         print(json.dumps([_replace_nan(row) for row in rows], indent=2, allow_nan=False))
     else:
         _print_rows(rows)
+        _print_differences(differences)
         if out:
             console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
 
@@ -134,6 +151,7 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
 
     for row in rows:
         metrics = {name: estimate for name, estimate in row.items() if isinstance(estimate, dict)}
+        metrics.pop("differences", None)
         metrics = {
             name: estimate
             for name, estimate in metrics.items()
@@ -146,3 +164,17 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         took = "" if row["seconds"] != row["seconds"] else speed
         counted = f"{row['missions']} {inflect('mission', row['missions'])}"
         console.print_text(f" {counted}, {row['uav_slots']} UAV-slots{took}{engine}")
+
+
+def _print_differences(differences: "pd.DataFrame") -> None:
+    """Each policy against the first one, mission by mission; nothing of a single policy."""
+    from dess.reports.cli.tables import choose_product_differences, print_frame
+
+    if differences.empty:
+        return
+    cells, _ = choose_product_differences(differences, "policy")
+    print_frame(f"against {differences['baseline'].iloc[0]} [points]", cells)
+    console.print_text(
+        f" {differences['n'].max():,} missions of both; p-values are corrected for "
+        f"{len(differences)} comparisons (Holm)"
+    )

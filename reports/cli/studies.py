@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import sys
 from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
@@ -151,11 +152,15 @@ def show(
     policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
     worst: Annotated[int, typer.Option(min=0)] = 5,
     target: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    compare: Annotated[int | None, typer.Option(metavar="POINT")] = None,
     everything: Annotated[bool, typer.Option("--all")] = False,
+    missions: Annotated[bool, typer.Option("--missions")] = False,
     as_csv: Annotated[bool, typer.Option("--csv")] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Show the results of a study: means, comparisons, selections, the worst missions.
+
+    Of a study that was interrupted, the means of the missions that are there.
 
     Args:
         folder: A results folder.
@@ -163,23 +168,41 @@ def show(
         worst: How many of the worst missions.
         target: Show the policies and design points whose mean of a metric (success, ratio,
             product) is at least this, by the lower end of its interval; repeatable.
+        compare: Compare every design point with this one, mission by mission: its number, as the
+            column point of --csv has it.
         everything: Show the tables of all metrics, not of the product alone.
-        as_csv: Print the means as CSV: a row per policy, design point and metric.
+        missions: Print the missions as CSV: a row per mission, with its design point and the value
+            of every field that the design varies.
+        as_csv: Print the means as CSV: a row per policy, design point and metric; with --compare,
+            the differences.
     """
     from dess.analysis import numbers
     from dess.analysis.answers import summary
-    from dess.analysis.metrics import column_in_sheet_unit
+    from dess.analysis.metrics import column_in_sheet_unit, without_nodes
     from dess.reports.cli import tables as printed
 
-    if as_csv and as_json:
-        raise InputError("--csv", "not with --json", "one of them")
+    if as_csv + as_json + missions > 1:
+        raise InputError("--csv, --json, --missions", "given together", "one of them")
     targets = _parse_targets(target or [])
-    results = _load_folder(folder)
+    results = _load_folder(folder, begun=True)
+    is_complete = results.manifest["complete"]
+    if not is_complete:
+        note = f"{folder}: incomplete, so these are means of what is there"
+        console.print_text(f"{note}; run the study again to complete it", sys.stderr)
     if policy is not None and policy not in results.policies:
         raise unknown_name("--policy", f"{policy!r} is not in the study", policy, results.policies)
     targets = {
         column_in_sheet_unit(metric, results.missions): end for metric, end in targets.items()
     }
+    if missions:
+        console.print_text(numbers.write_csv(without_nodes(results.missions)).rstrip())
+        return
+    if compare is not None:
+        _show_comparison(results, compare, everything, as_csv, as_json)
+        return
+    if not is_complete:
+        _show_begun(results, folder, targets, as_csv, as_json)
+        return
     means = summary.settings_meeting(summary.means_of_points(results), targets)
     means = summary.add_verdicts(results, means)
     if as_csv:
@@ -196,12 +219,63 @@ def show(
         printed.print_details(results, shown, everything)
 
 
-def _load_folder(folder: Path) -> "Results":
-    """The results in a folder; a study that is kept elsewhere is named with its folder."""
-    from dess.analysis.results.tables import load_results
+def _show_comparison(
+    results: "Results", point: int, everything: bool, as_csv: bool, as_json: bool
+) -> None:
+    """Show how every design point differs from one of them, with the same policy."""
+    from dess.analysis import numbers
+    from dess.analysis.answers.settings import baseline
+    from dess.analysis.metrics import METRICS, PRODUCT, measured_in
+    from dess.reports.cli import tables as printed
+
+    metrics = [*METRICS, *measured_in(results.missions)]
+    if as_csv or as_json:
+        table = baseline.compare_with_baseline(results, point, metrics)
+        if as_csv:
+            console.print_text(numbers.write_csv(table).rstrip())
+            return
+        about = {"study": results.study.name, "baseline": point}
+        rows = json.loads(table.to_json(orient="records"))
+        print(json.dumps(about | {"compared": rows}, indent=2))
+        return
+    console.print_text(f"against {baseline.baseline_in_words(results, point)}")
+    for metric in metrics if everything else [PRODUCT]:
+        printed.print_table_with_caption(baseline.baseline_table(results, point, metric))
+
+
+def _show_begun(
+    results: "Results", folder: Path, targets: dict[str, float], as_csv: bool, as_json: bool
+) -> None:
+    """Show the means of a study that is not complete, and how many missions they are of."""
+    from dess.analysis import numbers, summary
+    from dess.analysis.answers.summary import settings_meeting
+    from dess.reports.cli import tables as printed
+
+    means = settings_meeting(summary(results.missions, by=["policy", "point"]), targets)
+    if as_csv:
+        console.print_text(numbers.write_csv(_add_field_values(results, means)).rstrip())
+    elif as_json:
+        document = _make_document(results, {"means": means}, targets) | {"complete": False}
+        print(json.dumps(document, indent=2))
+    else:
+        printed.print_begun(results, means, folder)
+
+
+def _load_folder(folder: Path, begun: bool = False) -> "Results":
+    """The results in a folder; a study that is kept elsewhere is named with its folder.
+
+    Args:
+        folder: The folder.
+        begun: Whether the study may be incomplete.
+    """
+    from dess.analysis.results.chunks import MANIFEST
+    from dess.analysis.results.manifest import Manifest
+    from dess.analysis.results.tables import load_begun, load_results
 
     if not folder.exists() and (options.RESULTS / folder).is_dir():
         raise InputError(folder, "no such folder", f"a results folder: {options.RESULTS / folder}")
+    if begun and not Manifest.read(folder / MANIFEST).complete:
+        return load_begun(folder)
     return load_results(folder)
 
 

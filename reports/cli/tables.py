@@ -25,7 +25,7 @@ from dess.analysis.metrics import (
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import MARKS, NOT_RULED_OUT, SEEN_BELOW, SEEN_WORSE, WORSE
-from dess.analysis.tables import comparison_cells, format_counts
+from dess.analysis.tables import Table, comparison_cells, format_counts
 from dess.analysis.tables import means_table as means_table
 from dess.reports.cli import console
 
@@ -64,6 +64,27 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         if len(results.store.manifest.points) <= MANY_POINTS:
             of_points = summary.means_of_points(results)
         _print_by_point(results, of_points, [PRODUCT])
+
+
+def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
+    """Print the means of a study that is not complete, with the missions of each."""
+    missions = numbers.format_count(len(results.missions), "mission")
+    console.print_text(f"{folder}: {missions} of study {results.study.name}, which is incomplete")
+    if results.study.selection:
+        console.print_text(" intervals do not allow for the search, which has not ended")
+    points = points_in_words(results)
+    shown = means[means["metric"].isin([SUCCESS, RATIO, PRODUCT])]
+    rows = []
+    for (policy, point), of_setting in shown.groupby(["policy", "point"], sort=False):
+        estimates = [
+            metric_of(row.metric).written(row.mean, row.low, row.high)
+            for row in of_setting.itertuples()
+        ]
+        rows.append([policy, points[int(point)], f"{of_setting['n'].max():,}", *estimates])
+    heads = [metric_of(metric).head for metric in (SUCCESS, RATIO, PRODUCT)]
+    console.print_table(["policy", "setting", "missions", *heads], rows[:MANY_POINTS])
+    if (more := len(rows) - MANY_POINTS) > 0:
+        console.print_text(f" {more:,} more rows; --csv and --json have them")
 
 
 def print_details(
@@ -112,6 +133,12 @@ def print_cells(cells: pd.DataFrame) -> None:
     """Print a table of text."""
     first = cells.columns[0]
     print_frame(str(first), cells.set_index(first))
+
+
+def print_table_with_caption(table: Table) -> None:
+    """Print a table, and its caption below."""
+    print_cells(table.cells)
+    console.print_text(f" {table.caption}")
 
 
 def _print_titled(title: str, cells: pd.DataFrame) -> None:

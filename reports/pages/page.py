@@ -4,13 +4,15 @@ import re
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-
-from markupsafe import Markup
+from typing import TYPE_CHECKING
 
 from dess import InputError
 from dess.analysis.results.resimulate import Evidence
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 # What is hidden in a page.
 STUDY, FILES, CARD, PANEL = "dess-study", "dess-files", "dess-card", "dess-panel"
@@ -36,7 +38,7 @@ class Learned(Document):
     files: dict[str, str]
 
     @property
-    def hidden(self) -> Markup:
+    def hidden(self) -> "Markup":
         """What a page contains of them, and does not show."""
         return hidden_element(FILES, self.model_dump_json())
 
@@ -59,14 +61,16 @@ class Card(Document):
     key: str = ""
 
     @property
-    def hidden(self) -> Markup:
+    def hidden(self) -> "Markup":
         """What a page contains of the card, and does not show."""
         return hidden_element(CARD, self.model_dump_json())
 
 
-def hidden_element(kind: str, text: str) -> Markup:
+def hidden_element(kind: str, text: str) -> "Markup":
     """An element with a JSON text that a page contains and does not show."""
     inert = text.replace("<", "\\u003c")  # so that the text cannot end the element
+    from markupsafe import Markup  # missions are checked without the libraries that render pages
+
     return Markup(f'<script class="{kind}" type="application/json">{inert}</script>')
 
 

@@ -1,6 +1,9 @@
 """``dess evaluate``: its JSON, its tables, and the missions that it keeps."""
 
-from dess.analysis import load_results
+import pytest
+
+from dess.analysis import compare, load_results
+from dess.analysis.metrics import METRICS
 
 
 def test_a_reader_gets_tables(dess):
@@ -44,3 +47,22 @@ def test_missions_can_be_kept_as_results(dess, dess_json, tmp_path):
     assert len(results.missions) == 80 and results.store.manifest.study.name == "my-results"
     assert dess("study", "show", "my results")[0] == 0
     assert dess("evaluate", "--policy", "greedy", "--seed", 4, "--out", "my results")[0] == 2
+
+
+def test_policies_are_compared_mission_by_mission(dess, dess_json, tmp_path):
+    """With the first one, as the missions of the study are that keeps them."""
+    asked = ("--scenario", "small.toml", "--policy", "random", "--policy", "greedy")
+    asked += ("--set", "uavs=2")
+    asked += ("--missions", 40, "--seed", 3)
+    first, second = dess_json("evaluate", *asked, "--out", "kept")
+    assert "against" not in first and second["against"] == "random"
+    missions = load_results(tmp_path / "kept").missions
+    rows = compare(missions, "random", [*METRICS]).set_index("metric")
+    for metric, found in second["differences"].items():
+        assert found == pytest.approx(rows.loc[metric, [*found]].to_dict())
+    ratios = missions.pivot(index="replication", columns="policy", values="collection_ratio")
+    difference = (ratios["greedy"] - ratios["random"]).mean()
+    assert second["differences"]["collection_ratio"]["difference"] == pytest.approx(difference)
+    assert dess_json("evaluate", *asked)[1]["differences"] == second["differences"]
+    assert "against random [points]" in dess("evaluate", *asked)[1]
+    assert "against" not in dess("evaluate", *asked[:4], "--missions", 2)[1]

@@ -6,6 +6,8 @@ import re
 import pandas as pd
 import pytest
 
+from dess.analysis import load_results, load_study, run_study
+
 FIELDS = ["uavs", "initial_data"]
 
 
@@ -75,3 +77,61 @@ def test_bad_options_get_one_line(dess, refusal):
     assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
     for options, words in BAD.items():
         assert words in refusal("study", "show", "out", *options.split())
+
+
+def test_an_interrupted_study_shows_what_is_there(dess, dess_json, tmp_path):
+    """Of every setting the missions up to the first one that is missing."""
+    text = (tmp_path / "trial.toml").read_text()
+    design = "kind = 'grid'\nvalues.uavs = [1, 2]\n"
+    (tmp_path / "grid.toml").write_text(f"{text}\n[design]\n{design}")
+    study = load_study(tmp_path / "grid.toml")
+    done = []
+
+    def interrupt(missions):
+        done.append(missions)
+        if sum(done) > 20:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, tmp_path / "out", progress=interrupt)
+    code, out, err = dess("study", "show", "out")
+    assert code == 0 and "out: incomplete, so these are means of what is there" in err
+    assert "which is incomplete" in out and "greedy" in out
+    data = dess_json("study", "show", "out")
+    assert data["complete"] is False
+    assert 0 < sum(row["n"] for row in data["means"] if row["metric"] == "success") < 40
+    run_study(study, tmp_path / "out")
+    whole = load_results(tmp_path / "out").missions
+    for row in data["means"]:
+        values = whole.query("policy == @row['policy'] and point == @row['point']")[row["metric"]]
+        assert row["mean"] == pytest.approx(values[: row["n"]].mean())
+    assert "incomplete" not in dess("study", "show", "out")[2]
+
+
+def test_design_points_are_compared_on_the_same_missions(shown, dess_json, refusal):
+    data = dess_json("study", "show", "out", "--compare", 1)
+    rows = pd.DataFrame(data["compared"]).query("metric == 'collection_ratio'")
+    assert len(rows) == 2 * 3 and data["baseline"] == 1
+    missions = load_results("out").missions
+    for row in rows.itertuples():
+        of_policy = missions[missions["policy"] == row.policy]
+        means = of_policy.groupby("point")["collection_ratio"].mean()
+        assert row.difference == pytest.approx(means[row.point] - means[1])
+    text = shown("study", "show", "out", "--compare", 1)[1]
+    assert text.startswith("against 1 UAV") and "paired difference from the baseline" in text
+    csv = pd.read_csv(io.StringIO(shown("study", "show", "out", "--compare", 1, "--csv")[1]))
+    assert len(csv) == len(data["compared"])
+    assert "4 is not a design point; allowed: 0..3" in refusal(
+        "study", "show", "out", "--compare", 4
+    )
+
+
+def test_missions_as_csv_have_their_design_point_and_every_varied_field(shown, refusal):
+    table = pd.read_csv(io.StringIO(shown("study", "show", "out", "--missions")[1]))
+    missions = load_results("out").missions
+    assert len(table) == 80 and table["point"].tolist() == missions["point"].tolist()
+    assert table["collection_ratio"].to_numpy() == pytest.approx(missions["collection_ratio"])
+    values = table.groupby("point")[FIELDS].first()
+    assert values["uavs"].tolist() == [1, 1, 2, 2]
+    assert values["initial_data"].tolist() == ["5", "[5, 9.5]"] * 2
+    assert "given together" in refusal("study", "show", "out", "--missions", "--json")
