@@ -106,7 +106,7 @@ class FlightPlan:
         files = {
             name: plan_text(route, self.sea, self.fence) for name, route in self.routes.items()
         }
-        return files | {TABLE: numbers.write_csv(self.make_table())}
+        return files | {TABLE: write_csv(self.make_table())}
 
     def make_table(self) -> pd.DataFrame:
         """All phases of all UAVs.
