@@ -36,7 +36,7 @@ from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
 from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in
-from dess.base.files.writing import toml_value, write_file
+from dess.base.files.writing import is_read_only, toml_value, write_file
 from dess.policies.registry import list_teams
 from dess.scenario.fields import dotted, fields_of
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
@@ -134,7 +134,8 @@ class Question:
         if not is_scenario_name(self.study.scenario):
             path = os.path.relpath(self.study.scenario, self.file.parent)
             data["scenario"] = Path(path).as_posix()
-        write_file(self.file, tomli_w.dumps(data))
+        if not (self.file.exists() and is_read_only(self.file.parent)):
+            write_file(self.file, tomli_w.dumps(data))
         return run_study(self.study, self.out, workers, None, progress, announce, reuse=reuse)
 
     @property

@@ -16,6 +16,7 @@ from dess.analysis.execution.jobs import simulate_missions
 from dess.analysis.results.store import Count, Store
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
+from dess.base.files.writing import check_folder
 from dess.policies.registry import Policy, folder_of, load_team
 from dess.policies.shipped import SHIPPED
 from dess.scenario.scenario import ScenarioSpace
@@ -310,6 +311,8 @@ def check_run(
     if reuse and total_time(plan, workers).low > LONG_RUN:
         plan = plan_study(study, out, workers, accept_code, reuse)
     missing = sum(planned.missing for planned in plan[:teams])
+    if any(planned.missing + planned.logs for planned in plan):
+        check_folder(Path(out))
     what = (
         f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
         f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"

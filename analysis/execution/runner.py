@@ -33,6 +33,7 @@ from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.stopping import Samples
 from dess.analysis.study.study import Study, load_study
+from dess.base.files.writing import check_folder
 from dess.policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
@@ -193,6 +194,8 @@ class _Run:
         """
         failures: dict[Path, Failure] = {}
         needs = [(kind, sum(map(len, parts)), [*self._jobs(kind, parts)]) for kind, parts in works]
+        if any(jobs for _, _, jobs in needs):
+            check_folder(self.store.folder)
         self.store.check_files(job.chunk for _, _, jobs in needs for job in jobs)
         for kind, needed, jobs in needs:
             if needed:

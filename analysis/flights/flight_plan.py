@@ -11,7 +11,7 @@ import pandas as pd
 from dess.analysis.flights.phases import Phase, list_phases
 from dess.analysis.flights.plan_file import Fence, plan_text
 from dess.analysis.flights.route import Approach, Route, SeaMap, closest_approach
-from dess.analysis.numbers import format_count
+from dess.analysis.numbers import format_count, write_csv
 from dess.analysis.results.event_log import Events
 from dess.base.errors import InputError
 from dess.scenario.own_sea import Positions
@@ -106,7 +106,7 @@ class FlightPlan:
         files = {
             name: plan_text(route, self.sea, self.fence) for name, route in self.routes.items()
         }
-        return files | {TABLE: self.make_table().to_csv(index=False)}
+        return files | {TABLE: write_csv(self.make_table())}
 
     def make_table(self) -> pd.DataFrame:
         """All phases of all UAVs.

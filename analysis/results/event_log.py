@@ -336,7 +336,7 @@ def path_text(events: Events, scenario: Scenario, kind: str, start: datetime | N
     if start or kind in ("kml", "gpx"):
         table["utc"] = _moments(table, start or _EPOCH)
     if kind == "csv":
-        return table.to_csv(index=False)
+        return numbers.write_csv(table)
     if scenario.centre:
         axes = ["lon", "lat"]
     else:

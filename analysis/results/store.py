@@ -54,6 +54,7 @@ from dess.base.files.writing import (
     check_folder,
     check_place,
     delete,
+    is_read_only,
     locked,
     make_folder,
     write_file,
@@ -116,12 +117,14 @@ class Store:
     Attributes:
         folder: The folder.
         manifest: The manifest of the folder.
+        is_read_only: Whether nothing can be written into the folder.
         damaged: The files whose content is not what their names say.
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder = folder
         self.manifest = manifest
+        self.is_read_only = False
         self._lock = ExitStack()  # what holds it
         self.damaged: list[Path] = []
         self._no_files: list[Path] = []  # what has the name of a file of missions and is none
@@ -140,7 +143,8 @@ class Store:
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
         """Open a results folder for a study: a new one, or one that the study completes or extends.
 
-        The folder stays locked until the end of the ``with`` block.
+        The folder stays locked until the end of the ``with`` block. One that is there and cannot
+        be written is only read, which is enough if nothing is missing.
 
         Args:
             study: The study.
@@ -148,11 +152,15 @@ class Store:
             accept_code: Whether to keep missions that were simulated by other code.
 
         Raises:
-            InputError: If the folder cannot be written, holds something else, or is in use.
+            InputError: If a new folder cannot be written, it holds something else, or is in use.
         """
         folder = Path(out)
         manifest = Manifest.of(study)
         store = cls(folder, _extended_manifest(folder, manifest, accept_code))
+        if is_read_only(folder):
+            store.is_read_only = True
+            store._scan()
+            return store
         chunks.check_places(folder)
         with ExitStack() as lock:
             lock.enter_context(locked(folder / chunks.LOCK, *_BUSY))
@@ -381,6 +389,8 @@ class Store:
 
         A file that has other missions as well stays.
         """
+        if self.is_read_only:
+            return
         parts = [part for chunk in large for part in chunk.parts]
         names = {c.name for c in large}
         rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
@@ -433,6 +443,8 @@ class Store:
         """Write into the manifest that all missions are present, and how many there are."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
+        if self.is_read_only:
+            return
         write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         for path in self._failures():
             delete(path)
@@ -640,8 +652,8 @@ def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> M
         InputError: If the folder contains something else.
     """
     path = folder / chunks.MANIFEST
-    check_folder(folder)
     if not path.exists():
+        check_folder(folder)
         if any(not chunks.is_ours(other) for other in paths_in(folder)):
             raise InputError(
                 folder,

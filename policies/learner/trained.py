@@ -125,6 +125,23 @@ def require_same_forms(arrays: Weights, wanted: Weights, where: str) -> None:
             raise InputError(where, f"{name} has impossible values", "finite numbers")
 
 
+def require_weights(weights: Weights, wanted: Weights, where: str) -> None:
+    """Refuse weights of other forms, or with which the sums of a network could overflow.
+
+    The largest sums of the networks that come with dess are below 200.
+
+    Raises:
+        InputError: As ``require_same_forms``, or if the absolute weights of an output have a sum of
+            more than ``MOST_SUM``.
+    """
+    require_same_forms(weights, wanted, where)
+    for name, array in weights.items():
+        sums = np.abs(array.astype(np.float64)).reshape(len(array), -1).sum(axis=1)
+        if sums.max() > MOST_SUM:
+            problem = f"{name} has weights whose sum is {sums.max():.3g}"
+            raise InputError(where, problem, f"sums of at most {MOST_SUM:,}, which cannot overflow")
+
+
 def arrays_under(arrays: Weights, name: str) -> Arrays:
     """The arrays whose names begin with ``name.``, without that prefix."""
     prefix = name + "."
@@ -157,6 +174,9 @@ def _is_sound(array: np.ndarray) -> bool:
         return bool((array.view(np.uint8) <= 1).all())
     return bool(np.isfinite(array).all())
 
+
+# Sums of single precision, 3e38 at most, stay finite behind seven layers with sums up to this one.
+MOST_SUM = 100_000
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
@@ -305,7 +325,7 @@ def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolic
         raise error.within(where) from None
     require_version(description.observation_version, observation, where)
     weights = _parse_weights(content, path)
-    require_same_forms(weights, expected_weights(config, observation), str(path))
+    require_weights(weights, expected_weights(config, observation), str(path))
     policy = make_policy(config, layout, observation, weights)
     policy.learner = learner_identifier(config)
     policy.weights = hash_arrays([config.observation, config.guard, values], weights)

@@ -26,7 +26,7 @@ from dess.policies.learner.trained import (
     expected_weights,
     make_observation,
     make_policy,
-    require_same_forms,
+    require_weights,
 )
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
@@ -178,7 +178,7 @@ class Training:
         Raises:
             InputError: If they are not those of such a network.
         """
-        require_same_forms(weights, expected_weights(self.config, self.observation), "from")
+        require_weights(weights, expected_weights(self.config, self.observation), "from")
         for network in self.learner.networks.values():
             network.load_state_dict(to_tensors(weights))
         self.best = _copy_weights(self.learner.evaluated)

@@ -274,20 +274,20 @@ class _Mission:
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import numpy as np
+    import pandas as pd
     import pyarrow as pa
-    from pyarrow.csv import write_csv
 
+    from dess.analysis.numbers import write_csv
     from dess.base.files.tables import parquet_of
     from dess.base.files.writing import fill
 
     columns = dict(mission.log)
     if names := mission.scenario.names:
         columns["name"] = np.array([*names, None])[columns["node"]]
-    table = pa.table(columns)
     if kind == "csv":
-        write_csv(table, path)
+        fill(path, write_csv(pd.DataFrame(columns)).encode())
     else:
-        fill(path, parquet_of(table))
+        fill(path, parquet_of(pa.table(columns)))
 
 
 def _write_map(mission: _Mission, path: Path, kind: str) -> None:

@@ -246,6 +246,11 @@ def check_folder(path: Path) -> None:
         raise InputError(path, f"cannot be written: {reason}", "another path")
 
 
+def is_read_only(folder: Path) -> bool:
+    """Whether a folder is there and no file can be written into it."""
+    return folder.is_dir() and not os.access(folder, os.W_OK)
+
+
 def check_new_folder(path: Path) -> None:
     """Refuse a folder that ``creating_folder`` could not make, before a long computation begins.
 

@@ -1,5 +1,6 @@
 """Questions: studies made of values, kept, and asked again."""
 
+import os
 import shlex
 import shutil
 
@@ -40,6 +41,23 @@ def sweep_of(fields, folder, **about):
 
 def check_equal_to_a_fresh_run(question, results, folder):
     assert diff_results(results, run_study(question.study, folder / "fresh")).identical
+
+
+def test_a_read_only_folder_that_has_all_missions_answers(asking, tmp_path, monkeypatch):
+    """Also where a rule decides how many there are; what lacks a mission is refused at once."""
+    prices = {"prices": {"uav": 1.0}, "requirements": {"success": 0.01}, "missions": 20}
+    searched = [asking(), asking(**prices)]
+    places = sorted((tmp_path / "results").rglob("*"))
+    times = [place.stat().st_mtime_ns for place in places]
+    monkeypatch.setattr("os.access", lambda path, mode: mode != os.W_OK)
+    for (question, results, _), about in zip(searched, ({}, prices), strict=True):
+        again, found, _ = asking(**about)
+        assert again.file == question.file
+        assert diff_results(results, found).identical
+    with pytest.raises(InputError, match="cannot be written: Permission denied"):
+        asking({**FIELDS, "uavs": [2, 3]})
+    assert sorted((tmp_path / "results").rglob("*")) == places
+    assert [place.stat().st_mtime_ns for place in places] == times
 
 
 OTHERS = {

@@ -73,6 +73,7 @@ def test_a_policy_comes_back_as_it_was(changes, tmp_path):
 
 
 ROUNDED, NAN = torch.zeros(1, dtype=torch.bfloat16), torch.full((5,), torch.nan)
+HUGE = torch.tensor([0.0, 3e38, 0.0, 0.0, 0.0])
 WHOLE = torch.zeros(1, dtype=torch.int64)
 DAMAGE: dict[str, tuple[str, torch.Tensor | None]] = {
     "value.bias is float32 [2]; allowed: float32 [1]": ("value.bias", torch.zeros(2)),
@@ -81,6 +82,10 @@ DAMAGE: dict[str, tuple[str, torch.Tensor | None]] = {
     "'value.bias' is missing": ("value.bias", None),
     "'value.slope' is one too many": ("value.slope", torch.zeros(1)),
     "advantage.bias has impossible values; allowed: finite numbers": ("advantage.bias", NAN),
+    "advantage.bias has weights whose sum is 3e+38; allowed: sums of at most 100,000, which": (
+        "advantage.bias",
+        HUGE,
+    ),
 }
 
 

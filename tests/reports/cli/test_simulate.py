@@ -115,6 +115,19 @@ def test_the_event_log_is_written_as_its_ending_says(dess, tmp_path):
     pd.testing.assert_frame_equal(log, table, check_dtype=False)
 
 
+def test_a_name_in_an_event_log_is_no_formula(dess, tmp_path):
+    """A spreadsheet runs what begins so; Parquet and --json have the name as it is."""
+    (tmp_path / "names.csv").write_text("name,x,y\n=1+1,3,4\nplain,5,6\n")
+    (tmp_path / "names.toml").write_text(
+        'nodes = "names.csv"\nuavs = 1\ngrid = 12\nzone = [0, 0, 2, 2]\n'
+    )
+    for name in ("log.csv", "log.parquet"):
+        assert dess("simulate", "--scenario", "names.toml", "--events", name)[0] == 0
+    names = {*pd.read_csv(tmp_path / "log.csv")["name"].dropna()}
+    assert names == {"'=1+1", "plain"}
+    assert {*pd.read_parquet(tmp_path / "log.parquet")["name"].dropna()} == {"=1+1", "plain"}
+
+
 BUOYS = "name,lon,lat\nAlpha,179.985,54.25\nBeta,-179.985,54.27\n"
 AT_SEA = ("--scenario", "buoys.toml", "--set", "uavs=2", "--policy", "greedy")
 
