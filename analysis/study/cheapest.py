@@ -395,7 +395,7 @@ class Cheapest(StrictTable):
             if metric not in _AGES and not self.tolerance < share < 1 - self.tolerance:
                 raise InputError(
                     f"requirements.{metric}",
-                    f"{share:g} is out of range",
+                    f"{shown(least)} is out of range",
                     f"between {self.tolerance:g} and {1 - self.tolerance:g}, which keeps the "
                     "tolerance away from 0 and 1",
                 )

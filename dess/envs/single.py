@@ -5,7 +5,7 @@ observation, info = env.reset(seed=1)
 observation, reward, terminated, truncated, info = env.step(4)
 """
 
-from typing import Any, SupportsInt
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,7 +17,7 @@ from dess.scenario.scenario import AnyScenario, ScenarioSpace
 _UAV = "uav_0"
 
 
-class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
+class HarvestSingleEnv(gymnasium.Env[Any, int]):
     """One mission of one UAV, whatever fleet the scenario has; see ``HarvestEnv``.
 
     The mask of the allowed actions is ``info["action_mask"]``, and that of the next step also
@@ -29,19 +29,28 @@ class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
 
     metadata = HarvestEnv.metadata
 
-    def __init__(self, scenario: AnyScenario = "paper", **options: Any):
+    def __init__(
+        self,
+        scenario: AnyScenario = "paper",
+        seed: int | None = None,
+        render_mode: str | None = None,
+        observation: str = "vector",
+        guarded: bool = False,
+    ):
         """Make an environment.
 
         Args:
             scenario: The scenario, or what ``load_scenario`` takes.
-            **options: ``seed``, ``render_mode``, ``observation`` and ``guarded`` of
-                ``parallel_env``.
+            seed: As of ``HarvestEnv``.
+            render_mode: As of ``HarvestEnv``.
+            observation: As of ``HarvestEnv``.
+            guarded: As of ``HarvestEnv``.
 
         Raises:
             InputError: If one of the arguments is not allowed.
         """
         space = ScenarioSpace.of(scenario, uavs=1)
-        self.mission = HarvestEnv(space, **options, mask="info", ended="stay")
+        self.mission = HarvestEnv(space, seed, render_mode, observation, "info", "stay", guarded)
         self.render_mode = self.mission.render_mode
         self.observation_space = self.mission.observation_space(_UAV)
         self.action_space = self.mission.action_space(_UAV)
@@ -60,9 +69,9 @@ class HarvestSingleEnv(gymnasium.Env[Any, SupportsInt]):
         super().reset(seed=seed)
         return self._own(self.mission.reset(seed, options))
 
-    def step(self, action: SupportsInt) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+    def step(self, action: int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Run one mission slot, as ``HarvestEnv.step``."""
-        return self._own(self.mission.step({_UAV: int(action)}))
+        return self._own(self.mission.step({_UAV: action}))
 
     def action_masks(self) -> np.ndarray:
         """The (5,) mask of the actions that are allowed in the next step."""

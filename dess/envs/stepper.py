@@ -219,7 +219,10 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         InputError: If they are not integers 0..4 of that shape.
     """
-    array = np.asarray(actions)
+    try:
+        array = np.asarray(actions)
+    except ValueError:  # a list in the place of an integer
+        raise InputError("actions", "are not all integers", f"integers of shape {shape}") from None
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise InputError(
             "actions", f"{array.dtype} of shape {array.shape}", f"integers of shape {shape}"

@@ -151,11 +151,21 @@ def is_generated(name: str) -> bool:
     return name.partition(":")[0] in FAMILIES or bool(re.fullmatch("[a-z]{2,}:[0-9]+", name))
 
 
-def sea_of(name: str) -> dict[str, Any]:
+# The fields of a generated sea in the place of which a data sheet stands: batteries, workload and
+# channel.
+_WITHOUT_SHEET = (
+    *("flying_time", "charge_start", "charge_complete"),
+    *("quota", "initial_data", "arrival_rate", "edge_snr"),
+)
+
+
+def sea_of(name: str, has_sheet: bool = False) -> dict[str, Any]:
     """The fields of a generated sea, with its description.
 
     Args:
         name: ``FAMILY:SEED``.
+        has_sheet: Whether a data sheet says what the UAVs, the radio and the data are, so that only
+            the sea and its fleet are drawn.
 
     Raises:
         InputError: If there is no such family or seed.
@@ -168,7 +178,8 @@ def sea_of(name: str) -> dict[str, Any]:
         if seed:
             wrong = f"has the seed {shown(seed)}"
         raise InputError(family, wrong, f"{family}:0..{family}:{MOST_SEED}")
-    return dict(_fields_of(family, int(seed)))
+    fields = _fields_of(family, int(seed))
+    return {n: value for n, value in fields.items() if not (has_sheet and n in _WITHOUT_SHEET)}
 
 
 def seas_of(name: str) -> list[str]:

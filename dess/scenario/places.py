@@ -9,6 +9,7 @@ projected about the centre of the grid (equirectangular projection).
 import csv
 import io
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -33,6 +34,8 @@ LIMITS = {("x", "y"): (99_999, 99_999), GEOGRAPHIC: (180, 90)}
 # What columns of a place are called; letters may be small or large.
 COLUMNS = {"lon": ("lon", "lng", "long", "longitude"), "lat": ("lat", "latitude")}
 COLUMNS |= {"x": ("x",), "y": ("y",)}
+# With this first line Excel says what parts the columns.
+_NAMED_DELIMITER = re.compile("sep=(.)", re.IGNORECASE)
 _ROUNDING = 1e-6  # degrees by which a file may be beyond a limit
 # An edge that is longer [degrees] crosses the 180th meridian instead.
 _LONGEST = 270
@@ -223,9 +226,14 @@ def read_table(path: Path) -> Places:
     """
     try:
         text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a CSV file").lstrip("\r\n")
-        first = text.partition("\n")[0]
-        lines = csv.reader(io.StringIO(text), strict=True, delimiter=max(",;\t", key=first.count))
-        columns = [name.strip() for name in next(lines, [])]
+        first, _, others = text.partition("\n")
+        named = _NAMED_DELIMITER.fullmatch(first.rstrip("\r"))
+        delimiter = max(",;\t", key=first.count)
+        if named:
+            delimiter = named[1]
+            text = f"\n{others}"  # so that the numbers of lines stay
+        lines = csv.reader(io.StringIO(text), strict=True, delimiter=delimiter)
+        columns = [name.strip() for name in next(filter(None, lines), [])]
         rows = [(f"line {lines.line_num}", row) for row in lines if any(map(str.strip, row))]
     except csv.Error as error:
         raise InputError(path, f"is not a CSV file: {error}", "CSV with commas") from None
@@ -233,7 +241,10 @@ def read_table(path: Path) -> Places:
     pairs = [pair for pair in LIMITS if all(len(axes[axis]) == 1 for axis in pair)]
     if len(pairs) != 1:
         present = ", ".join(columns) or "none"
-        raise InputError(path, f"has columns {present}", "x and y, or lon and lat")
+        allowed = "x and y, or lon and lat"
+        if pairs:
+            allowed = "one pair: x and y are cells, lon and lat degrees"
+        raise InputError(path, f"has columns {present}", allowed)
     is_geographic = pairs == [GEOGRAPHIC]
     places = []
     for line, texts in rows:

@@ -265,7 +265,7 @@ def parsed_scenario(text: str, path: Path, context: str = "") -> ScenarioSpace:
 def _load(
     name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
 ) -> ScenarioSpace:
-    where, read = found or _read(name_or_path)
+    where, read = found or _read(name_or_path, bool(merged({}, overrides).get("data_sheet")))
     with notes_after():
         return _of_values(name_or_path, where, read, overrides, context)
 
@@ -370,12 +370,17 @@ def scenario_description(name_or_path: str | Path) -> str:
     return str(_read(name_or_path)[1].get("description", ""))
 
 
-def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
-    """The name or path of a scenario, for messages, and its fields."""
+def _read(name_or_path: str | Path, has_sheet: bool = False) -> tuple[str, dict[str, Any]]:
+    """The name or path of a scenario, for messages, and its fields.
+
+    Args:
+        name_or_path: The scenario.
+        has_sheet: Whether it gets a data sheet, which a generated sea does not have.
+    """
     check_type("scenario", name_or_path, str | Path, _NAMED)
     name = str(name_or_path)
     if is_generated(name):
-        return f"scenario {name}", sea_of(name)
+        return f"scenario {name}", sea_of(name, has_sheet)
     return _SCENARIOS.load(name_or_path, others=scenario_families())
 
 

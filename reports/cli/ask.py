@@ -1,6 +1,7 @@
 """``dess sweep`` and ``dess what-if``: a question in one line, and its answer with a page."""
 
 import json
+import re
 import shlex
 import sys
 from collections.abc import Callable
@@ -253,7 +254,8 @@ def _print_answer(
 def _with_quotes(text: str) -> str:
     """The name of a currency, or a time with its unit, in TOML syntax."""
     key, _, value = text.partition("=")
-    is_time = key.strip() in ("age", "oldest") and value.strip(" .0123456789") != ""
+    is_number = re.fullmatch(r"[-+]?[0-9.,]+ ?%?", value.strip())
+    is_time = key.strip() in ("age", "oldest") and not is_number
     is_text = key.strip() == "currency" or is_time
     quoted = not is_text or value.strip().startswith(("'", '"'))
     if quoted:

@@ -175,6 +175,8 @@ def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[s
     key, equals, value = (part.strip() for part in text.partition("="))
     if allowed == FIELD and takes_quantities(key) and value:
         value = _quote_quantities(value)
+    elif equals:
+        _refuse_number(value, f"{option}: {key}", allowed != FIELD)
     with suppress(InputError):
         parsed = parse_toml(f"value = {value}", option)
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
@@ -185,7 +187,44 @@ def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[s
     if allowed == FIELD and value:
         _check_word(key, value, option)
         return key, value
+    if key and value and equals:
+        raise InputError(f"{option}: {key}", f"{shown(value)} is no number", allowed)
     raise InputError(option, f"{shown(text)} is not KEY=VALUE", allowed)
+
+
+def _refuse_number(value: str, where: str, is_amount: bool = True) -> None:
+    """Refuse a number as people write it and TOML does not, or reads as another one.
+
+    Args:
+        value: The value.
+        where: Where it stands, for the message.
+        is_amount: Whether it is a price or a share, and not a field of a scenario, of which a comma
+            parts several values.
+
+    Raises:
+        InputError: If it is one: the message says what may be meant.
+    """
+    from dess.scenario.quantities import may_part_thousands
+
+    joined = value.replace(",", "").replace(".", "")
+    problem = "is no number"
+    if may_part_thousands(value) or (is_amount and may_part_thousands(value.replace(".", ","))):
+        problem = "may be a thousand or a fraction"
+        meant = f"{joined} or {float(value.replace(',', '.'))}"
+        if not is_amount:
+            problem = "has a comma that may part thousands or values"
+            meant = f"{joined}, or dess sweep for several values"
+    elif re.fullmatch(r"[-+]?(\.[0-9]+|[0-9]+\.)", value):
+        meant = str(float(value))
+    elif re.fullmatch(r"[-+]?0[0-9]+", value):
+        meant = str(int(value))
+    elif is_amount and re.fullmatch(r"[-+]?[0-9]+,[0-9]+", value):
+        meant = value.replace(",", ".")
+    elif is_amount and re.fullmatch(r"[-+]?[0-9]+(\.[0-9]+)? ?%", value):
+        meant = f"{float(value.rstrip(' %')) / 100:g}"
+    else:
+        return
+    raise InputError(where, f"{shown(value)} {problem}", meant)
 
 
 def takes_quantities(field: str) -> bool:
@@ -309,6 +348,8 @@ def parse_values(text: str) -> tuple[str, tuple[Any, ...]]:
     except InputError:
         listed = [word.strip() for word in values.split(",")]
         named = [word for word in listed if word.replace("-", "_").isidentifier()]
+        for word in listed if equals else ():
+            _refuse_number(word, f"{SET}: {field}", is_amount=False)
         for word in named:
             _check_word(field, word)
         if not equals or len(named) < len(listed):

@@ -333,6 +333,7 @@ def _parse_start(text: str, *, is_used: bool) -> datetime:
     if not 1970 <= moment.year <= 2100:
         raise InputError("--start", f"{shown(text)} is out of range", allowed)
     if moment.tzinfo is None:
+        console.print_text(f"note: --start {text} has no time zone and is taken as UTC", sys.stderr)
         return moment.replace(tzinfo=UTC)
     return moment.astimezone(UTC)
 

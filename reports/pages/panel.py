@@ -395,7 +395,7 @@ def hash_missions(space: ScenarioSpace, policy: str, seed: int, fleet: int) -> l
     records = simulate_batch(space, [load(policy)], seed, CHECKED)
     padded = _with_room(records, fleet)
     return [
-        sha256(b"".join(kind[row].tobytes() for kind in padded)).hexdigest()
+        sha256(b"".join(kind[row].tobytes() for kind in padded if len(kind))).hexdigest()
         for row in range(CHECKED)
     ]
 

@@ -69,7 +69,7 @@ function checkInWords(chosen, replication, record) {
 }
 
 async function open() {
-    if (!window.WebAssembly || !window.DecompressionStream) return;
+    checkBrowser();
     ({module, image} = await unpackEngine("panel"));
     root.hidden = false;
     root.querySelectorAll("fieldset").forEach((fieldset) => { fieldset.disabled = false; });
@@ -83,5 +83,5 @@ async function open() {
     root.dataset.ready = "yes";
 }
 
-open().catch((error) => { root.hidden = true; console.warn(`Missions cannot be simulated here: ${error.message}`); });
+open().catch((error) => sayWhyNot(root, error));
 })();

@@ -1,6 +1,7 @@
 // The engine of dess in a page: the WebAssembly module, with the arrays of a scenario.
 // See docs/reference/webassembly.md. Used by the page and by its workers.
 
+const FORBIDDEN = "The server of the page, or the browser, may forbid it. A copy of the page that you save and open as a file may be able to.";
 const WORDS = 5; // of the table of arrays, for each array: its address and up to four sizes
 
 /**
@@ -150,4 +151,23 @@ class Engine {
     follow(policy) {
         this.integers("policies").fill(BigInt(policy));
     }
+}
+
+/**
+ * Say in the place of a panel why its page cannot simulate.
+ * @param {any} root
+ * @param {Error} error
+ */
+function sayWhyNot(root, error) {
+    const line = document.createElement("p");
+    line.className = "note";
+    line.textContent = `This page cannot simulate missions here: ${error.message}. ${FORBIDDEN}`;
+    root.replaceChildren(line);
+    root.hidden = false;
+}
+
+// Refuse a browser that lacks what a page needs to simulate.
+function checkBrowser() {
+    for (const name of ["WebAssembly", "DecompressionStream", "Worker"])
+        if (!(/** @type {any} */ (window))[name]) throw new Error(`the browser has no ${name}`);
 }

@@ -523,7 +523,7 @@ function reset() {
 }
 
 async function open() {
-    if (!window.WebAssembly || !window.DecompressionStream || !window.Worker) return;
+    checkBrowser();
     ({module, image} = await unpackEngine("panel"));
     crew = new Crew(document.getElementById("panel-worker").textContent, {module, image}, stop);
     const isAsked = [...new URLSearchParams(location.hash.slice(1)).keys()].some((name) => named(name));
@@ -558,5 +558,5 @@ async function open() {
     root.dataset.ready = "yes";
 }
 
-open().catch((error) => { root.hidden = true; console.warn(`The panel cannot start: ${error.message}`); });
+open().catch((error) => sayWhyNot(root, error));
 })();

@@ -260,6 +260,7 @@ class Crew {
         this.members = [];
         /** @type {Job | null} */
         this.job = null;
+        this.hasWorked = false;
     }
 
     /** @param {Job} job */
@@ -268,8 +269,12 @@ class Crew {
         this.job = job;
         this.number += 1;
         const most = Math.min(Math.max((navigator.hardwareConcurrency || 2) - 1, 1), MOST_WORKERS);
-        while (this.members.length < most) this.members.push(this.hire());
-        this.wake();
+        try {
+            while (this.members.length < most) this.members.push(this.hire());
+            this.wake();
+        } catch (error) { // where workers are forbidden, some browsers throw, and others send an event
+            this.lose(error.message);
+        }
     }
 
     end() {
@@ -287,10 +292,20 @@ class Crew {
         member.worker.onmessage = (event) => this.take(member, event.data);
         member.worker.onerror = (event) => {
             event.preventDefault();
-            this.fail(`The browser ended the simulation (${event.message || "a worker died"}); what is shown is of the missions before.`);
+            this.lose(event.message || "a worker died");
         };
         member.worker.postMessage(this.engine);
         return member;
+    }
+
+    /**
+     * Say why a worker was lost.
+     * @param {string} why
+     */
+    lose(why) {
+        this.fail(this.hasWorked
+            ? `The browser ended the simulation (${why}); what is shown is of the missions before.`
+            : `This page cannot simulate missions here: its workers cannot start (${why}). ${FORBIDDEN}`);
     }
 
     // Give orders to those who have none.
@@ -312,6 +327,7 @@ class Crew {
      */
     take(member, answer) {
         member.isBusy = false;
+        this.hasWorked = true;
         if (!this.job || answer.job !== this.number) return;
         this.job.take(answer);
         this.give(member);

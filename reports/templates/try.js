@@ -62,7 +62,7 @@ function show(why = "") {
 }
 
 async function open() {
-    if (!window.WebAssembly || !window.DecompressionStream || !window.Worker) return;
+    checkBrowser();
     ({module, image} = await unpackEngine("panel"));
     const stop = (why = "") => { crew.end(); show(why); };
     crew = new Crew(document.getElementById("panel-worker").textContent, {module, image}, stop);
@@ -75,5 +75,5 @@ async function open() {
     root.dataset.ready = "yes";
 }
 
-open().catch((error) => { root.hidden = true; console.warn(`Missions cannot be simulated here: ${error.message}`); });
+open().catch((error) => sayWhyNot(root, error));
 })();

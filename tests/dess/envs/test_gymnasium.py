@@ -138,3 +138,26 @@ def test_what_reset_does_not_honour_it_refuses(line):
     with pytest.raises(InputError, match=f"^{line}"):
         env.reset(**REFUSED[line])
     assert np.array_equal(env._present()["replication"], before)  # the missions go on
+
+
+@pytest.mark.parametrize(
+    "action", [2.7, np.float32(2.7), "4", np.array([4]), None, np.nan, True, 5]
+)
+def test_a_lone_uav_takes_integers_alone(action):
+    """What is no integer is not rounded or read as one; an array of a single integer is a list."""
+    env = dess.single_env("paper")
+    env.reset(seed=1)
+    with pytest.raises(
+        InputError, match=r"actions: .*; allowed: (0\.\.4|integers of shape \(1, 1\))"
+    ):
+        env.step(action)
+    env.step(np.array(4))
+    with pytest.raises(TypeError, match="unexpected keyword argument 'mask'"):
+        dess.single_env("paper", mask="observation")  # type: ignore[call-arg]
+
+
+def test_a_list_in_the_place_of_an_action_is_refused():
+    env = dess.parallel_env(dess.load_scenario("paper", uavs=2))
+    env.reset(seed=1)
+    with pytest.raises(InputError, match="actions: are not all integers; allowed: integers of"):
+        env.step({"uav_0": 4, "uav_1": [4]})

@@ -110,3 +110,17 @@ def test_bad_names_are_refused_in_one_line(name, line):
     with pytest.raises(InputError, match=f"^{line}") as error:
         load_scenario(name)
     assert "\n" not in str(error.value)
+
+
+def test_a_data_sheet_takes_the_place_of_what_is_drawn_beside_the_sea():
+    """Batteries, data and channel follow from the sheet; cells, zones, pads and fleet stay."""
+    sheet = {"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min"}
+    sheet |= {"bandwidth": "125 kHz", "snr": "12 dB at 2 km", "data_rate": "3 MB/h"}
+    drawn = load_scenario("archipelago:7")
+    space = load_scenario("archipelago:7", **{f"data_sheet.{n}": v for n, v in sheet.items()})
+    for field in ("grid", "rows", "nodes", "no_fly", "zone", "zones", "pads", "uavs"):
+        assert getattr(space, field) == getattr(drawn, field), field
+    assert (space.cell_size, space.quota, space.flying_time) == (315, 0, (100, 100))
+    assert space == load_scenario("archipelago:7", data_sheet=sheet)
+    assert load_scenario("archipelago:7", data_sheet=sheet, quota=90).quota == 90
+    assert load_scenario("archipelago:7") == drawn

@@ -375,6 +375,7 @@ TABLES = [
     "long\tlatitude\tname\n0.005\t0.005\tAlpha\n-0.005\t-0.005\tBeta\n",
     "name,X,Y\nAlpha,4,2\nBeta,3,3\n",
     "\ufeff\nname,X,Y\nAlpha,4,2\nBeta,3,3\n",
+    "\ufeffsep=;\r\nlabel;lng;lat\r\nAlpha;0,005;0,005\r\nBeta;-0,005;-0,005\r\n",
 ]
 
 

@@ -193,7 +193,12 @@ ODD = features(("Circle", [8, 54]))
 NODES: list[tuple[str, Any, str]] = [
     ("n.csv", "", "has columns none; allowed: x and y, or lon and lat"),
     ("n.csv", "lat,y\n8,54\n", "has columns lat, y; allowed"),
-    ("n.csv", "x,y,lon,lat\n1,1,8,54\n", "has columns x, y, lon, lat; allowed"),
+    (
+        *("n.csv", "x,Y,lon,lat\n1,1,8,54\n"),
+        "has columns x, Y, lon, lat; allowed: one pair: x and y are cells, lon and lat degrees",
+    ),
+    ("n.csv", "sep=;\nx;y\n1;1\n2;one\n", "line 4: y is 'one'; allowed: a number"),
+    ("n.csv", "sep=|\r\nx;y\r\n1;1\r\n", "has columns x;y; allowed: x and y, or lon and lat"),
     ("n.csv", "x,y\n", "has 0 nodes; allowed: 1..1024"),
     ("n.csv", "x,y\n1,1\n\n2\n", "line 4: y is ''; allowed: a number"),
     ("n.csv", "x,y\nnan,1\n", "line 2: x is nan; allowed: -99,999..99,999"),

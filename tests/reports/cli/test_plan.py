@@ -21,7 +21,8 @@ def sea(tmp_path):
 
 
 def test_the_flights_of_a_mission_are_written_and_told(dess, dess_json, tmp_path, sea):
-    code, out, _ = dess(*AT_SEA, "--plan", "plans", "--start", "2026-06-01T10:00+02:00")
+    code, out, err = dess(*AT_SEA, "--plan", "plans", "--start", "2026-06-01T10:00+02:00")
+    assert "time zone" not in err
     assert code == 0
     table = pd.read_csv(tmp_path / "plans" / "plan.csv")
     flights = table["file"].dropna()
@@ -111,7 +112,10 @@ def test_tracks_have_the_times_of_day(dess, tmp_path, sea):
     """In UTC, a slot of the sheet apart; without a start, GPX counts from 1970 on as KML does."""
     begin = ("--start", "2026-06-01T23:59:55")
     for kind in ("csv", "geojson", "kml", "gpx"):
-        assert dess(*AT_SEA, *begin, "--path", f"p.{kind}", "--json")[0] == 0
+        code, _, err = dess(*AT_SEA, *begin, "--path", f"p.{kind}", "--json")
+        assert (
+            code == 0 and "--start 2026-06-01T23:59:55 has no time zone and is taken as UTC" in err
+        )
     times = pd.read_csv(tmp_path / "p.csv")["utc"].tolist()
     assert times[:3] == ["2026-06-01T23:59:55Z", "2026-06-02T00:00:05Z", "2026-06-02T00:00:15Z"]
     (feature,) = json.loads((tmp_path / "p.geojson").read_text())["features"]

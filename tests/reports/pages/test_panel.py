@@ -129,6 +129,32 @@ def test_what_cannot_be_simulated_in_a_page_is_a_sentence():
     assert "continuous time" in make_panel(space, space, "paper", ["greedy"], SEED).data
 
 
+@pytest.mark.slow
+@pytest.mark.brief
+@pytest.mark.parametrize(
+    ("policy", "words"),
+    [
+        ("script-src 'unsafe-inline'", "WebAssembly"),
+        (
+            "script-src 'unsafe-inline' 'wasm-unsafe-eval'; worker-src 'none'",
+            "workers cannot start",
+        ),
+    ],
+)
+def test_a_page_says_when_it_is_forbidden_to_simulate(document, tmp_path, visit, policy, words):
+    """By a server's Content-Security-Policy, which adds to that of the page."""
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+    path = tmp_path / "page.html"
+    path.write_text(document.read_text("utf-8").replace("<head>", f"<head>{meta}", 1), "utf-8")
+    tab: Tab = visit(path, 1280).page
+    if "workers" in words:
+        tab.locator("#panel[data-ready=yes]").wait_for()
+        tab.locator("[data-panel=run]").click()
+    line = tab.locator("#panel", has_text="This page cannot simulate missions here: ")
+    line.filter(has_text=words).wait_for(timeout=PATIENCE)
+    assert "A copy of the page that you save and open as a file" in line.inner_text()
+
+
 def test_a_panel_that_nobody_changed_is_found_sound(document):
     checks = {check.what: check for check in verify_page(document, 1, 0)}
     assert checks["panel"].compared == CHECKED
