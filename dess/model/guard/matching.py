@@ -80,6 +80,11 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         plan.queues[zone].change = 0
         while left[zone] < 0 and _move_on(mission, plan.turns, prices, left, zone):
             left[zone] += 1
+    for zone in range(mission.zones):
+        plan.queues[zone].is_full = left[zone] <= 0
+    for j in range(mission.uavs):
+        if plan.turns[j].zone >= 0:
+            plan.turns[j].asks = _slots_to_zone(uavs[j], chart, plan.turns[j].zone)
 
 
 @inlined
@@ -93,6 +98,17 @@ def _write_prices(mission, u, chart, prices, reach):
         spent += u.slots_left * dearest_slot(mission)
         slots = cells * u.slots_per_cell + u.slots_left
         prices[zone] = min(prices[zone], _price(mission, u, spent, slots))
+
+
+@inlined
+def _slots_to_zone(u, chart, zone):
+    """The slots in which a UAV can be in a zone."""
+    cells = chart.zones.size
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        if chart.zones[y, x] == zone:
+            cells = min(cells, distance(chart, u.x, u.y, x, y))
+    return cells * u.slots_per_cell + u.slots_left
 
 
 @inlined

@@ -118,11 +118,22 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
             return _choose(mission, uavs, i, chart, memory, reach)
         match_zones(mission, uavs, data, chart, memory.plan, reach)
         home = _choose(mission, uavs, i, chart, memory, reach)
-        gives_way = np.int64(0 <= uavs[i].zone != memory.plan.turns[i].zone)
+        gives_way = np.int64(_leaves_cell(uavs[i], memory.plan.turns[i].zone, home, memory.plan))
         return Home(home.x, home.y, home.cells, home.wait, home.begins, gives_way)
+    for zone in range(mission.zones):
+        memory.plan.queues[zone].is_full = 0
     wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
     home = _choose(mission, uavs, i, chart, memory, reach)
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
+
+
+@inlined
+def _leaves_cell(u, zone, home, plan):
+    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one."""
+    if u.zone < 0 or zone < 0:
+        return False
+    is_elsewhere = u.x != home.x or u.y != home.y
+    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere)
 
 
 @inlined
@@ -181,6 +192,9 @@ def _choose(mission, uavs, i, chart, memory, reach):
     """
     u, taken, turns = uavs[i], memory.taken, memory.plan.turns
     are_matched = is_tight(mission, chart)
+    if are_matched and keeps_cell(mission, u):
+        memory.planned[:] = -1
+        return stays(u)
     taken[:] = _FREE
     for j in range(mission.uavs):
         o = uavs[j]
@@ -191,14 +205,19 @@ def _choose(mission, uavs, i, chart, memory, reach):
         if not are_matched:
             keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
-    for place in range(_sort(mission, uavs, turns, memory.order)):
+    count = _sort(mission, uavs, turns, memory.order)
+    for place in range(count):
         j = memory.order[place]
         o = uavs[j]
         if j != i and (o.grounded or _has_cell(mission, o, are_matched)):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
-        cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
+        if turns[j].zone >= 0 and memory.plan.queues[turns[j].zone].is_full:
+            later = memory.order[place + 1 : count]
+            cell, cells = _deepest_free(mission, uavs, j, later, chart, memory, reach)
+        else:
+            cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
         if j == i:
             if cell < 0:
                 break
@@ -215,6 +234,31 @@ def _has_cell(mission, u, are_matched):
     if are_matched:
         return keeps_cell(mission, u)
     return is_parked(mission, u)
+
+
+@shared_kernel
+def _deepest_free(mission, uavs, j, later, chart, memory, reach):
+    """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
+
+    It is the one that is farthest from those that come later, so that it closes none of their ways.
+    """
+    u, turns = uavs[j], memory.plan.turns
+    zone, best, way, most = turns[j].zone, -1, -1, -1
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        if chart.zones[y, x] != zone or memory.taken[cell] == _TAKEN:
+            continue
+        cells = path_length(mission, uavs, j, chart, None, u.x, u.y, x, y)
+        spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
+        farthest = chart.zones.size
+        for other in later:
+            if turns[other].zone == zone and not keeps_cell(mission, uavs[other]):
+                farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
+        if spent >= usable_battery(mission, u):
+            farthest = 0
+        if best < 0 or farthest > most or (farthest == most and cells < way):
+            best, way, most = cell, cells, farthest
+    return best, way
 
 
 @inlined

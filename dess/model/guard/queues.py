@@ -71,6 +71,7 @@ QUEUE = np.dtype(
         ("price", np.int64),  # what its plan costs
         # The slots between two UAVs on a pad: where not all have a cell, the next one waits outside.
         ("change", np.int64),
+        ("is_full", np.int64),  # whether each of its cells is taken (``dess.model.guard.matching``)
     ]
 )
 
@@ -417,14 +418,14 @@ def _following(mission, j, plan):
 def _gives_way(mission, uavs, i, plan):
     """Whether UAV ``i`` must not ask now: a UAV that the plan has before it would come after it."""
     zone = plan.turns[i].zone
-    is_full = plan.queues[zone].change > 0  # one that does not leave its cell keeps others out
+    takes_turns = plan.queues[zone].change > 0  # one that does not leave its cell keeps others out
     is_asking = plan.queues[zone].order != _AS_ASKED and plan.turns[i].asks <= 0
-    if uavs[i].zone != zone or not (is_full or is_asking):
+    if uavs[i].zone != zone or not (takes_turns or is_asking):
         return False
     for j in range(mission.uavs):
         begins_first = plan.turns[j].zone == zone and plan.turns[j].begins < plan.turns[i].begins
         has_asked = uavs[j].pad_request >= 0
         asks_after = plan.turns[j].asks > 0 or (j > i and not mission.lowest_battery_first)
-        if begins_first and (asks_after or is_full) and not has_asked:
+        if begins_first and (asks_after or takes_turns) and not has_asked:
             return True
     return False
