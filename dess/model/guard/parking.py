@@ -241,6 +241,7 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
     """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
 
     It is the one that is farthest from those that come later, so that it closes none of their ways.
+    The cell of a teammate that may leave it, or one out of reach, is taken if no other is left.
     """
     u, turns = uavs[j], memory.plan.turns
     zone, best, way, most = turns[j].zone, -1, -1, -1
@@ -252,9 +253,10 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
         farthest = chart.zones.size
         for other in later:
-            if turns[other].zone == zone and not keeps_cell(mission, uavs[other]):
+            if turns[other].zone == zone and uavs[other].zone != zone:
                 farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
-        if spent >= usable_battery(mission, u):
+        is_occupied = memory.taken[cell] == _OCCUPIED and cells > 0
+        if is_occupied or spent >= usable_battery(mission, u):
             farthest = 0
         if best < 0 or farthest > most or (farthest == most and cells < way):
             best, way, most = cell, cells, farthest
