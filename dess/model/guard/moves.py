@@ -200,7 +200,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
             leaves = elsewhere & ~_ceded(mission, uavs, i)
         if not leaves and u.overruled and u.zone >= 0 and is_tight(mission, chart):
-            leaves = _one_of(elsewhere, mission.slot)  # who waits outside may want the same cell
+            # Who waits outside may want the same cell.
+            leaves = _one_of(clear & in_time & ~(1 << HOVER) or elsewhere, mission.slot)
         if leaves:
             return leaves
     if nearest & empty and least == 0 and u.overruled:

@@ -7,13 +7,19 @@ import numpy as np
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.matching import is_tight, keeps_cell, match_zones
-from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
+from dess.model.guard.queues import (
+    QUEUE,
+    TURN,
+    Plan,
+    is_given_up,
+    may_wait,
+    plan_pads,
+    waits_in_zone,
+)
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.model.ways_home import is_calm
 from dess.physics.chart import distance
-from dess.physics.failures import working_pads
 from dess.physics.landing import lands
-from dess.physics.section import for_sections
 from dess.scenario.fields import MOST_ZONES
 
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;
@@ -277,7 +283,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     cells, nearest_zone = distance(chart, u.x, u.y, x, y), np.int64(chart.zones[y, x])
-    free = (cells == 0 or memory.taken[cell] <= most) and not _is_given_up(mission, nearest_zone)
+    free = (cells == 0 or memory.taken[cell] <= most) and not is_given_up(mission, nearest_zone)
     free = free and is_calm(reach) and (zone < 0 or zone == nearest_zone)
     if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == cells:
         return cell, cells
@@ -314,7 +320,7 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         is_elsewhere = u.x != x or u.y != y
-        if (memory.taken[cell] > most and is_elsewhere) or _is_given_up(mission, zone):
+        if (memory.taken[cell] > most and is_elsewhere) or is_given_up(mission, zone):
             continue
         # no detour makes a cell better than a nearer one of the same zone
         is_far = zone == best_zone and distance(chart, u.x, u.y, x, y) >= way
@@ -325,10 +331,3 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         if best < 0 or spent < least or (spent == least and cells < way):
             best, best_zone, way, least = cell, zone, cells, spent
     return best, way, least
-
-
-@for_sections
-def _is_given_up(mission, zone):
-    """Whether no pad of one of several zones will ever work again."""
-    never = mission.pad_rate > 0.0 and mission.zone_pad_repair[zone] == 0.0
-    return mission.zones > 1 and never and working_pads(mission, zone) == 0
