@@ -15,6 +15,7 @@ from dess.model.guard.battery import (
     usable_battery,
     will_charge,
 )
+from dess.model.guard.matching import is_tight
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import (
@@ -198,6 +199,9 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         leaves = elsewhere & empty or elsewhere & clear
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
             leaves = elsewhere & ~_ceded(mission, uavs, i)
+        if not leaves and u.overruled and u.zone >= 0 and is_tight(mission, chart):
+            # Who waits outside may want the same cell.
+            leaves = _one_of(clear & in_time & ~(1 << HOVER) or elsewhere, mission.slot)
         if leaves:
             return leaves
     if nearest & empty and least == 0 and u.overruled:
@@ -215,6 +219,14 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     if least == 0 and levels > 0:
         nearest = nearest & ~_ceded(mission, uavs, i) or nearest
     return nearest or 1 << HOVER  # who gives way may have nowhere to go
+
+
+@inlined
+def _one_of(actions, number):
+    """One of some actions, which differs from number to number."""
+    while not actions >> number % 5 & 1:
+        number += 1
+    return 1 << number % 5
 
 
 @inlined

@@ -7,13 +7,19 @@ import numpy as np
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.matching import is_tight, keeps_cell, match_zones
-from dess.model.guard.queues import QUEUE, TURN, Plan, may_wait, plan_pads, waits_in_zone
+from dess.model.guard.queues import (
+    QUEUE,
+    TURN,
+    Plan,
+    is_given_up,
+    may_wait,
+    plan_pads,
+    waits_in_zone,
+)
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
 from dess.model.ways_home import is_calm
 from dess.physics.chart import distance
-from dess.physics.failures import working_pads
 from dess.physics.landing import lands
-from dess.physics.section import for_sections
 from dess.scenario.fields import MOST_ZONES
 
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;
@@ -118,11 +124,22 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
             return _choose(mission, uavs, i, chart, memory, reach)
         match_zones(mission, uavs, data, chart, memory.plan, reach)
         home = _choose(mission, uavs, i, chart, memory, reach)
-        gives_way = np.int64(0 <= uavs[i].zone != memory.plan.turns[i].zone)
+        gives_way = np.int64(_leaves_cell(uavs[i], memory.plan.turns[i].zone, home, memory.plan))
         return Home(home.x, home.y, home.cells, home.wait, home.begins, gives_way)
+    for zone in range(mission.zones):
+        memory.plan.queues[zone].is_full = 0
     wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
     home = _choose(mission, uavs, i, chart, memory, reach)
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
+
+
+@inlined
+def _leaves_cell(u, zone, home, plan):
+    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one."""
+    if u.zone < 0 or zone < 0:
+        return False
+    is_elsewhere = u.x != home.x or u.y != home.y
+    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere)
 
 
 @inlined
@@ -181,6 +198,9 @@ def _choose(mission, uavs, i, chart, memory, reach):
     """
     u, taken, turns = uavs[i], memory.taken, memory.plan.turns
     are_matched = is_tight(mission, chart)
+    if are_matched and keeps_cell(mission, u):
+        memory.planned[:] = -1
+        return stays(u)
     taken[:] = _FREE
     for j in range(mission.uavs):
         o = uavs[j]
@@ -191,14 +211,19 @@ def _choose(mission, uavs, i, chart, memory, reach):
         if not are_matched:
             keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
-    for place in range(_sort(mission, uavs, turns, memory.order)):
+    count = _sort(mission, uavs, turns, memory.order)
+    for place in range(count):
         j = memory.order[place]
         o = uavs[j]
         if j != i and (o.grounded or _has_cell(mission, o, are_matched)):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
-        cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
+        if turns[j].zone >= 0 and memory.plan.queues[turns[j].zone].is_full:
+            later = memory.order[place + 1 : count]
+            cell, cells = _deepest_free(mission, uavs, j, later, chart, memory, reach)
+        else:
+            cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
         if j == i:
             if cell < 0:
                 break
@@ -217,6 +242,33 @@ def _has_cell(mission, u, are_matched):
     return is_parked(mission, u)
 
 
+@shared_kernel
+def _deepest_free(mission, uavs, j, later, chart, memory, reach):
+    """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
+
+    It is the one that is farthest from those that come later, so that it closes none of their ways.
+    The cell of a teammate that may leave it, or one out of reach, is taken if no other is left.
+    """
+    u, turns = uavs[j], memory.plan.turns
+    zone, best, way, most = turns[j].zone, -1, -1, -1
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        if chart.zones[y, x] != zone or memory.taken[cell] == _TAKEN:
+            continue
+        cells = path_length(mission, uavs, j, chart, None, u.x, u.y, x, y)
+        spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
+        farthest = chart.zones.size
+        for other in later:
+            if turns[other].zone == zone and uavs[other].zone != zone:
+                farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
+        is_occupied = memory.taken[cell] == _OCCUPIED and cells > 0
+        if is_occupied or spent >= usable_battery(mission, u):
+            farthest = 0
+        if best < 0 or farthest > most or (farthest == most and cells < way):
+            best, way, most = cell, cells, farthest
+    return best, way
+
+
 @inlined
 def _soonest_free(mission, uavs, i, chart, memory, reach):
     """The number of the best parking cell that is not taken (-1 if none), and the way to it.
@@ -231,7 +283,7 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     cells, nearest_zone = distance(chart, u.x, u.y, x, y), np.int64(chart.zones[y, x])
-    free = (cells == 0 or memory.taken[cell] <= most) and not _is_given_up(mission, nearest_zone)
+    free = (cells == 0 or memory.taken[cell] <= most) and not is_given_up(mission, nearest_zone)
     free = free and is_calm(reach) and (zone < 0 or zone == nearest_zone)
     if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == cells:
         return cell, cells
@@ -268,7 +320,7 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         is_elsewhere = u.x != x or u.y != y
-        if (memory.taken[cell] > most and is_elsewhere) or _is_given_up(mission, zone):
+        if (memory.taken[cell] > most and is_elsewhere) or is_given_up(mission, zone):
             continue
         # no detour makes a cell better than a nearer one of the same zone
         is_far = zone == best_zone and distance(chart, u.x, u.y, x, y) >= way
@@ -279,10 +331,3 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         if best < 0 or spent < least or (spent == least and cells < way):
             best, best_zone, way, least = cell, zone, cells, spent
     return best, way, least
-
-
-@for_sections
-def _is_given_up(mission, zone):
-    """Whether no pad of one of several zones will ever work again."""
-    never = mission.pad_rate > 0.0 and mission.zone_pad_repair[zone] == 0.0
-    return mission.zones > 1 and never and working_pads(mission, zone) == 0

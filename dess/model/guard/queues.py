@@ -34,6 +34,7 @@ from dess.physics.chart import distance
 from dess.physics.consumption import PERCENT, has_consumption, slot_cost
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
+from dess.physics.section import for_sections
 from dess.scenario.fields import MOST_ZONES
 
 # The price of a slot that a UAV lacks; one that it has not to spare, of so many, costs 1.
@@ -69,8 +70,9 @@ QUEUE = np.dtype(
     [
         ("order", np.int64),  # in which it charges UAVs
         ("price", np.int64),  # what its plan costs
-        # The slots between two UAVs on a pad: where not all have a cell, the next one waits outside.
+        # The slots between two UAVs on a pad, if not all have a cell and the next waits outside.
         ("change", np.int64),
+        ("is_full", np.int64),  # whether each of its cells is taken (``dess.model.guard.matching``)
     ]
 )
 
@@ -135,6 +137,13 @@ def needs_pad(mission, u, data):
     return u.active and not u.grounded and (u.pad_request >= 0 or must_charge(mission, u, data))
 
 
+@for_sections
+def is_given_up(mission, zone):
+    """Whether no pad of one of several zones will ever work again."""
+    never = mission.pad_rate > 0.0 and mission.zone_pad_repair[zone] == 0.0
+    return mission.zones > 1 and never and working_pads(mission, zone) == 0
+
+
 @shared_kernel
 def plan_pads(mission, uavs, i, data, chart, plan, reach):
     """Plan where and when all UAVs charge that must; see the text of the module.
@@ -162,7 +171,7 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
             turn.way[u.zone] = 0
             turn.spent[u.zone] = 0
         else:
-            _find_ways(mission, u, turn, chart, reach)
+            find_ways(mission, u, turn, chart, reach)
     _choose_zones(mission, uavs, chart, plan)
     zone = plan.turns[i].zone
     if zone < 0 or uavs[i].pad_request >= 0:
@@ -202,7 +211,7 @@ def _slots_to_charge_start(mission, battery):
 
 
 @inlined
-def _find_ways(mission, u, turn, chart, reach):
+def find_ways(mission, u, turn, chart, reach):
     """Write the ways of a UAV to all zones, and choose the one that takes the least battery."""
     for zone in range(mission.zones):
         turn.spent[zone] = -1
@@ -417,14 +426,14 @@ def _following(mission, j, plan):
 def _gives_way(mission, uavs, i, plan):
     """Whether UAV ``i`` must not ask now: a UAV that the plan has before it would come after it."""
     zone = plan.turns[i].zone
-    is_full = plan.queues[zone].change > 0  # one that does not leave its cell keeps others out
+    takes_turns = plan.queues[zone].change > 0  # one that does not leave its cell keeps others out
     is_asking = plan.queues[zone].order != _AS_ASKED and plan.turns[i].asks <= 0
-    if uavs[i].zone != zone or not (is_full or is_asking):
+    if uavs[i].zone != zone or not (takes_turns or is_asking):
         return False
     for j in range(mission.uavs):
         begins_first = plan.turns[j].zone == zone and plan.turns[j].begins < plan.turns[i].begins
         has_asked = uavs[j].pad_request >= 0
         asks_after = plan.turns[j].asks > 0 or (j > i and not mission.lowest_battery_first)
-        if begins_first and (asks_after or is_full) and not has_asked:
+        if begins_first and (asks_after or takes_turns) and not has_asked:
             return True
     return False
