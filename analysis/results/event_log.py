@@ -57,6 +57,21 @@ def battery_levels(events: Events) -> pd.DataFrame:
     return levels.sort_values(["uav", "time"], ignore_index=True)
 
 
+def battery_from_full(battery: Any, scenario: Scenario, uav: int) -> Any:
+    """What a UAV shows of its own battery [%], which in the model begins above the reserve.
+
+    Args:
+        battery: The battery in the model [%], a number or an array.
+        scenario: The scenario of the mission.
+        uav: The number of the UAV, from 0.
+    """
+    if not scenario.data_sheet.is_on:
+        return battery
+    full = scenario.data_sheet.fields()["charge_complete"]
+    usable = scenario.battery_of_type(type_of(scenario.fleet, uav)) or full
+    return 100 - full + battery * (full / usable)
+
+
 def residual_data(events: Events) -> pd.DataFrame:
     """Residual data [data units] at every mission slot's start (rows) and node (columns).
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dess.analysis.flights.flight_plan import FlightPlan
+    from dess.analysis.flights.separation import Separation
     from dess.model.record import MissionRecord
     from dess.policies.registry import Policy
     from dess.scenario.own_sea import Positions
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
+MOST_DISTANCE = 100  # of UAVs of a plan from each other [m]
 PATHS = (".geojson", ".kml", ".gpx", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
@@ -58,6 +60,8 @@ def simulate(
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
     path: Annotated[Path | None, typer.Option(metavar="FILE.geojson")] = None,
     plan: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    air_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "10 m",
+    ground_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "3 m",
     start: Annotated[str | None, typer.Option(metavar="TIME")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
@@ -81,6 +85,9 @@ def simulate(
         plan: Write each flight into this new folder, as a .plan that QGroundControl reads, and a
             table of them. The mission is simulated with forbid_swaps; the sea needs degrees and a
             data sheet.
+        air_distance: With --plan: how far apart UAVs are if one of them is in the air; a plan
+            with less is refused.
+        ground_distance: With --plan: how far apart UAVs stand.
         start: Time of the start for --path and --plan, e.g. 2026-06-01T08:00Z.
     """
     from dess import simulate
@@ -91,7 +98,8 @@ def simulate(
     from dess.scenario.scenario import ScenarioSpace
 
     if of:
-        _refuse_given(context, "scenario", "settings", "seed")
+        allowed = "--of without --{}"
+        _refuse_given(context, ("scenario", "settings", "seed"), "comes from the study", allowed)
         asked = _read_study(of, point, policy, replication)
     elif point is not None:
         raise InputError("--point", "belongs to a study", "with --of DIR")
@@ -109,7 +117,12 @@ def simulate(
     if start is not None:
         begin = _parse_start(start, is_used=path is not None or plan is not None)
     positions = None
-    if plan is not None:
+    separation = None
+    if plan is None:
+        options_of_plan = ("air_distance", "ground_distance")
+        _refuse_given(context, options_of_plan, "belongs to a plan", "with --plan DIR")
+    else:
+        separation = _parse_separation(air_distance, ground_distance)
         positions = _prepare_plan(plan, asked, settings)
         asked = replace(asked, space=ScenarioSpace.of(asked.space, forbid_swaps=True))
     writers = {
@@ -143,7 +156,7 @@ def simulate(
                 writers[file](mission, temporary, file.suffix[1:].lower())
         flight_plan = None
         if folder and positions:
-            flight_plan = _write_plan(mission, positions, folder)
+            flight_plan = _write_plan(mission, positions, separation, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
@@ -154,7 +167,7 @@ def simulate(
         if record.operations is not None:
             measured["operations"] = in_units
         if flight_plan:
-            measured["plan"] = flight_plan.summarise_errors()
+            measured["plan"] = flight_plan.summarise()
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
@@ -233,13 +246,13 @@ def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: 
     return given
 
 
-def _refuse_given(context: typer.Context, *names: str) -> None:
-    """Refuse options that a study answers."""
+def _refuse_given(context: typer.Context, names: Sequence[str], problem: str, allowed: str) -> None:
+    """Refuse options that do not fit to the others; ``allowed`` has a place for the option."""
     for name in names:
         source = context.get_parameter_source(name)
         if source and source.name != "DEFAULT":
-            option = _OPTION_OF.get(name, name)
-            raise InputError(f"--{option}", "comes from the study", f"--of without --{option}")
+            option = _OPTION_OF.get(name, name.replace("_", "-"))
+            raise InputError(f"--{option}", problem, allowed.format(option))
 
 
 @dataclass(frozen=True)
@@ -364,11 +377,31 @@ def _open_folder(plan: Path | None) -> AbstractContextManager[Path | None]:
     return creating_folder(plan)
 
 
-def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "FlightPlan":
+def _parse_separation(air: str, ground: str) -> "Separation":
+    """How far apart UAVs have to be.
+
+    Raises:
+        InputError: If one of them is no length, or out of range.
+    """
+    from dess.analysis.flights.separation import Separation
+    from dess.scenario.quantities import quantity_of
+
+    metres = []
+    for option, text in (("--air-distance", air), ("--ground-distance", ground)):
+        length = quantity_of(text, option, "m")
+        if not 1 <= length <= MOST_DISTANCE:
+            raise InputError(option, f"{shown(text)} is out of range", f"1 m..{MOST_DISTANCE} m")
+        metres.append(length)
+    return Separation(*metres)
+
+
+def _write_plan(
+    mission: _Mission, positions: "Positions", separation: "Separation | None", folder: Path
+) -> "FlightPlan":
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.base.files.writing import fill
 
-    flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start)
+    flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start, separation)
     for name, text in flight_plan.make_files().items():
         fill(folder / name, text)
     return flight_plan
