@@ -14,7 +14,7 @@ from dess.analysis.flights.phases import FLIGHT, list_phases
 from dess.analysis.flights.plan_file import plan_text
 from dess.analysis.flights.route import Route, SeaMap
 from dess.analysis.flights.schedule import Entry, Schedule
-from dess.analysis.flights.separation import Approach, Separation, closest_approach
+from dess.analysis.flights.separation import ROUNDING, Approach, Separation, closest_approach
 from dess.analysis.numbers import format_count, join_words
 from dess.analysis.results.event_log import Events, battery_from_full
 from dess.base.errors import InputError
@@ -102,7 +102,7 @@ class FlightPlan:
             (self.approach, self.separation.air, "in the air"),
             (self.approach_on_ground, self.separation.ground, "on the ground"),
         ):
-            if approach and approach.metres < least:
+            if approach and approach.metres < least - ROUNDING:
                 problem = f"two UAVs come too near: {self._describe_approach(approach)}"
                 allowed = f"{least:g} m and more {where}, such as another --replication may have"
                 raise InputError("--plan", problem, allowed)

@@ -112,9 +112,7 @@ class Schedule:
         """A UAV at its own place of the zone in which it begins."""
         zone = self._sea.zone_of(phase.visits[0].cell)
         place = self.places[zone].standing[phase.uav]
-        # A UAV flies higher than the one before it, and above those who stand.
-        lowest = max(self._sea.scenario.altitude, self._separation.air)
-        altitude = round(lowest + self._separation.spacing * phase.uav, 3)
+        altitude = self._separation.altitudes(self._sea.scenario)[phase.uav]
         craft = Craft.of(self._sea.scenario, phase.uav, altitude)
         track = Track.of(phase.uav, [Moment(0.0, place, 0.0)], self._sea)
         return _Uav(phase.uav, craft, zone, place, float(phase.battery[0]), track, [])

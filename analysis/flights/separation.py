@@ -6,8 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.analysis.flights.route import Moment, SeaMap
+from dess.scenario.scenario import Scenario
 
-_MARGIN = 0.5  # by which UAVs are planned further apart than they have to be [m]
+ROUNDING = 1e-6  # of distances [m]
+_MARGIN = 0.5  # by which UAVs in flight are planned further apart [m]
 
 
 class Separation(NamedTuple):
@@ -29,6 +31,11 @@ class Separation(NamedTuple):
         metre more allows for the rounding of places, and for the margin of ``keeps_apart``.
         """
         return max(self) + 1
+
+    def altitudes(self, scenario: Scenario) -> list[float]:
+        """Those of the UAVs [m]: each flies higher than the one before it, and above who stands."""
+        lowest = max(scenario.altitude, self.air)
+        return [round(lowest + self.spacing * uav, 3) for uav in range(scenario.uavs)]
 
 
 class Approach(NamedTuple):
@@ -87,12 +94,14 @@ class Pieces(NamedTuple):
         metres: (N,) the least distance.
         seconds: (N,) when that is.
         on_ground: (N,) whether both stand on the ground all the time.
+        in_air: (N,) whether neither stands on the ground all the time.
         in_zone: (N,) whether one of them is in a zone at an end of it.
     """
 
     metres: np.ndarray
     seconds: np.ndarray
     on_ground: np.ndarray
+    in_air: np.ndarray
     in_zone: np.ndarray
 
     @classmethod
@@ -120,14 +129,21 @@ class Pieces(NamedTuple):
         towards = -(away[:-1] * step).sum(axis=1)
         share = np.divide(towards, length, out=np.zeros_like(length), where=length > 0)
         share = np.clip(share, 0, 1)
-        stand = (altitudes == 0) & (other_altitudes == 0)
+        stands = _in_pieces(altitudes == 0)
+        other_stands = _in_pieces(other_altitudes == 0)
         in_zone = sea.in_zones(spots) | sea.in_zones(other_spots)
         return cls(
             np.linalg.norm(away[:-1] + share[:, None] * step, axis=1),
             times[:-1] + share * np.diff(times),
-            stand[:-1] & stand[1:],
+            stands & other_stands,
+            ~stands & ~other_stands,
             in_zone[:-1] | in_zone[1:],
         )
+
+
+def _in_pieces(at_times: np.ndarray) -> np.ndarray:
+    """(N - 1,) what holds at both ends of a piece."""
+    return at_times[:-1] & at_times[1:]
 
 
 def keeps_apart(
@@ -137,11 +153,11 @@ def keeps_apart(
     sea: SeaMap,
     between: tuple[float, float],
 ) -> bool:
-    """Whether a UAV keeps the distances to others, with a margin, between two times [s]."""
+    """Whether a UAV keeps the distances to others between two times [s]."""
     for other in others:
         pieces = Pieces.of(track, other, sea, between)
         least = np.where(pieces.on_ground, separation.ground, separation.air)
-        if (pieces.metres < least + _MARGIN).any():
+        if (pieces.metres < least + _MARGIN * pieces.in_air - ROUNDING).any():
             return False
     return True
 

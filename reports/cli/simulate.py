@@ -85,9 +85,9 @@ def simulate(
         plan: Write each flight into this new folder, as a .plan that QGroundControl reads, and a
             table of them. The mission is simulated with forbid_swaps; the sea needs degrees and a
             data sheet.
-        air_distance: With --plan: how far apart UAVs are if one of them is in the air; a plan
-            with less is refused.
-        ground_distance: With --plan: how far apart UAVs stand.
+        air_distance: How far apart UAVs are if one of them is in the air, in a plan and in the
+            altitudes of paths; a plan with less is refused.
+        ground_distance: How far apart UAVs stand.
         start: Time of the start for --path and --plan, e.g. 2026-06-01T08:00Z.
     """
     from dess import simulate
@@ -117,12 +117,12 @@ def simulate(
     if start is not None:
         begin = _parse_start(start, is_used=path is not None or plan is not None)
     positions = None
-    separation = None
-    if plan is None:
+    separation = _parse_separation(air_distance, ground_distance)
+    if plan is None and path is None:
         options_of_plan = ("air_distance", "ground_distance")
-        _refuse_given(context, options_of_plan, "belongs to a plan", "with --plan DIR")
-    else:
-        separation = _parse_separation(air_distance, ground_distance)
+        allowed = "with --plan DIR or --path FILE"
+        _refuse_given(context, options_of_plan, "no output has altitudes", allowed)
+    if plan is not None:
         positions = _prepare_plan(plan, asked, settings)
         asked = replace(asked, space=ScenarioSpace.of(asked.space, forbid_swaps=True))
     writers = {
@@ -150,13 +150,14 @@ def simulate(
             which = asked.seed, asked.replication
             has_log = bool(paths) or plan is not None or not as_json
             record = simulate(asked.space, asked.team, *which, events=has_log)
-        mission = _Mission(record, sample_scenario(asked.space, *which), asked.title, begin)
+        drawn = sample_scenario(asked.space, *which)
+        mission = _Mission(record, drawn, asked.title, separation, begin)
         for file, temporary in zip(paths, temporaries, strict=True):
             with writable(file):
                 writers[file](mission, temporary, file.suffix[1:].lower())
         flight_plan = None
         if folder and positions:
-            flight_plan = _write_plan(mission, positions, separation, folder)
+            flight_plan = _write_plan(mission, positions, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
@@ -262,6 +263,7 @@ class _Mission:
     record: "MissionRecord"
     scenario: "Scenario"
     title: str
+    separation: "Separation"
     start: datetime | None = None
 
     @property
@@ -327,7 +329,11 @@ def _write_path(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.results.event_log import path_text
     from dess.base.files.writing import fill
 
-    fill(path, path_text(mission.log, mission.scenario, kind, mission.start).encode())
+    altitudes = None
+    if mission.scenario.units and mission.scenario.landing:
+        altitudes = mission.separation.altitudes(mission.scenario)
+    text = path_text(mission.log, mission.scenario, kind, mission.start, altitudes)
+    fill(path, text.encode())
 
 
 def _parse_start(text: str, *, is_used: bool) -> datetime:
@@ -395,13 +401,13 @@ def _parse_separation(air: str, ground: str) -> "Separation":
     return Separation(*metres)
 
 
-def _write_plan(
-    mission: _Mission, positions: "Positions", separation: "Separation | None", folder: Path
-) -> "FlightPlan":
+def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "FlightPlan":
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.base.files.writing import fill
 
-    flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start, separation)
+    flight_plan = FlightPlan.of(
+        mission.log, mission.scenario, positions, mission.start, mission.separation
+    )
     for name, text in flight_plan.make_files().items():
         fill(folder / name, text)
     return flight_plan
@@ -453,12 +459,12 @@ def _print_mission(mission: _Mission) -> None:
         rows = [[label, f"{value:g}"] for label, value in labelled]
         console.print_table(["", "beyond the paper"], rows)
     uavs = mission.record.uav_rows()
-    rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
+    rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs, 1)]
     console.print_table(["UAV", *uavs[0]], rows)
     if names := mission.scenario.names:
         data = residual_data(mission.log).to_numpy()
         of_nodes = zip(names, mission.scenario.nodes, data[0], data[-1], strict=True)
         rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
         console.print_table(["node", "cell", "data at the start", "at the end"], rows)
-    for cause in causes_of_failure(mission.log, mission.scenario, first=0):  # as in the table
+    for cause in causes_of_failure(mission.log, mission.scenario):
         console.print_text(f"{cause}.")

@@ -33,6 +33,7 @@ from tests.analysis.flights.hand import (
     TYPED,
     log_of,
     middle,
+    place,
     scenario_of,
     write_sea,
 )
@@ -355,6 +356,81 @@ def test_the_pieces_of_a_fence_cover_the_no_fly_cells_and_no_others(rows):
         # On the grid y grows south, so that a positive area is clockwise on a map.
         assert (x[:-1] * y[1:] - x[1:] * y[:-1]).sum() > 0
     assert (covered == closed).all()
+
+
+def test_the_fence_has_at_most_64_corners_and_covers_what_is_near(jade_bight):
+    """At e1931ad2 it had 178; PX4 keeps 64 in all polygons together."""
+    fence = jade_bight.fence
+    assert fence.all_corners == 178 and fence.corners <= 64
+    sea = jade_bight.sea
+    size = sea.scenario.size
+    fenced = np.zeros(size[::-1], bool)
+    for polygon in fence.outside:
+        corners = sea.spots(polygon)
+        fenced |= centres_in([np.concatenate([corners, corners[:1]])], size)
+    closed = sea.scenario.chart.zones == NO_FLY
+    ways = np.concatenate([route_spots(sea, route) for route in jade_bight.routes.values()])
+    assert not fenced[np.floor(ways[:, 1]).astype(int), np.floor(ways[:, 0]).astype(int)].any()
+    near = np.inf if fence.left_out is None else fence.left_out
+    for y, x in np.argwhere(closed):
+        distance = np.hypot(*(ways - [x + 0.5, y + 0.5]).T).min() * sea.scenario.cell_size
+        assert fenced[y, x] or distance >= near - sea.scenario.cell_size
+
+
+def route_spots(sea, route):
+    """(N, 2) places along a way [cells]."""
+    spots = sea.spots([point.place for point in route.points])
+    return np.concatenate([np.linspace(a, b, 99) for a, b in zip(spots, spots[1:], strict=False)])
+
+
+def test_dess_reads_the_geofence_of_its_own_plan(tmp_path):
+    """Beside the sea of the plan, it closes what that sea has closed, and nothing else."""
+    grid = ["........"] * 8
+    grid[4] = "...##..#"
+    grid[5] = "...#...."
+    (tmp_path / "land.txt").write_text("\n".join(grid))
+    sea = write_sea(tmp_path, fields='no_fly = "land.txt"\n')
+    files = plan_of(sea, THERE).make_files()
+    (tmp_path / "own.plan").write_text([*files.values()][0])
+    assert len(load_scenario(sea).no_fly) == 4
+    again = write_sea(tmp_path, fields='no_fly = "own.plan"\n')
+    assert load_scenario(again).no_fly == ((3, 4), (4, 4), (7, 4), (3, 5))
+
+
+def test_fences_of_others_have_circles_and_what_uavs_stay_in(tmp_path):
+    """All cells outside of a polygon of 6 x 6 cells are closed, and a circle in it."""
+    corners = [[lat, lon] for lon, lat in map(place, (1, 7, 7, 1), (0, 0, 6, 6))]
+    circle = {"center": [*reversed(middle(4, 4))], "radius": 100}
+    fence = {
+        "polygons": [{"inclusion": True, "polygon": corners, "version": 1}],
+        "circles": [{"inclusion": False, "circle": circle, "version": 1}],
+        "version": 2,
+    }
+    (tmp_path / "own.plan").write_text(json.dumps({"fileType": "Plan", "geoFence": fence}))
+    sea = write_sea(tmp_path, zone="zone = [2, 0, 2, 1]\n", fields='no_fly = "own.plan"\n')
+    closed = set(load_scenario(sea).no_fly)
+    inside = {(x, y) for x in range(1, 7) for y in range(6)}
+    assert closed & inside == {(4, 4)}
+    assert len(closed) == 64 - 36 + 1
+
+
+@pytest.mark.parametrize(
+    ("fence", "problem"),
+    [
+        ({}, "geoFence"),
+        ({"geoFence": {"polygons": [{"polygon": [[0, 0], [0, 1]], "inclusion": True}]}}, "corners"),
+        (
+            {"geoFence": {"polygons": [{"polygon": [[0, 200]] * 3, "inclusion": True}]}},
+            "lon is 200",
+        ),
+        ({"geoFence": {"polygons": [{"polygon": [5] * 3, "inclusion": True}]}}, "two numbers"),
+    ],
+)
+def test_what_is_no_fence_is_refused_in_one_line(tmp_path, fence, problem):
+    (tmp_path / "own.plan").write_text(json.dumps(fence))
+    sea = write_sea(tmp_path, fields='no_fly = "own.plan"\n')
+    with pytest.raises(InputError, match=problem):
+        load_scenario(sea)
 
 
 def test_the_files_have_the_form_of_qgroundcontrol(jade_bight, tmp_path):
