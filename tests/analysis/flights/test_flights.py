@@ -18,13 +18,13 @@ from dess.analysis.flights import flight_plan
 from dess.analysis.flights.fence import outline_pieces
 from dess.analysis.flights.flight_plan import TABLE, FlightPlan
 from dess.analysis.flights.places import ZonePlaces
-from dess.analysis.flights.route import Moment, Place
+from dess.analysis.flights.route import Craft, Moment, Place
 from dess.analysis.flights.separation import Separation, Track, closest_approach
 from dess.model.state import sample_scenario
 from dess.physics.chart import NO_FLY
 from dess.scenario.no_fly import centres_in
 from dess.scenario.rotary_wing import RotaryWing
-from dess.scenario.scenario import ScenarioSpace, positions_in
+from dess.scenario.scenario import Scenario, ScenarioSpace, positions_in
 from tests.analysis.flights.hand import (
     CELL,
     SHEET,
@@ -309,6 +309,17 @@ def test_a_climb_that_is_longer_than_the_way_is_told(tmp_path):
     assert "UAVs climb and descend at 3 m/s, which is assumed (climb in the data sheet)." in (
         plan.list_sentences()
     )
+
+
+def test_what_climbs_take_is_what_the_docs_say():
+    text = Path("docs/concepts/left-out.md").read_text("utf-8")
+    table = text.split("| altitude [m] |")[1].split("\n\n")[0].splitlines()[2:]
+    scenario = Scenario.of(load_scenario("jade-bight"), uavs=1)
+    for row in table:
+        altitude, seconds, battery = (float(cell) for cell in row.strip("| ").split("|"))
+        craft = Craft.of(scenario, 0, altitude)
+        assert seconds == pytest.approx(2 * craft.vertical_seconds, abs=0.05)
+        assert battery == pytest.approx(craft.vertical_battery, abs=0.005)
 
 
 def test_who_waits_for_a_pad_moves_to_it_and_away_from_it(tmp_path):
