@@ -5,6 +5,7 @@ action (``step_towards``): the safe action that brings the UAV nearest to its go
 teammates. These functions are compiled and work on the arrays of one mission.
 """
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -41,6 +42,8 @@ _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
 # Weight of the nodes that a UAV can visit after the next one (age).
 _BEYOND = 0.1
+# By how many standard deviations a node has less data than came in if it was served (tour).
+_SPREADS = 3.0
 _FINE = 2.0**24  # parts of a slot of age per slot of distance
 # Cost [slots] of a step into a cell, by the guard's contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
@@ -104,7 +107,13 @@ class Greedy(_Heuristic):
 
 
 class Tour(_Heuristic):
-    """Follow a fixed circuit through the nodes, split into equal parts, one for each UAV."""
+    """Follow a fixed circuit through the nodes, split into equal parts, one for each UAV.
+
+    With a quota, a UAV goes on to the next node when it has all the data of one. Without a quota,
+    data come in as long as the mission lasts. Then a UAV goes on to the node of its own part that
+    was emptied the longest ago, as soon as a communication slot has emptied the present one, or has
+    left less in it than has come in at the next one meanwhile.
+    """
 
     name = "tour"
     _kind = TOUR
@@ -256,13 +265,15 @@ def _choose_goal(
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == AGE:
             score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
+        elif u.quota == 0:
+            score = _score_by_turn(mission, i, data[k], sensors[k], circuit[k])
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if score <= best:  # the weights below are at most 1
             continue
         if kind in (GREEDY, AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             score *= _SHARED
-        if kind != AGE and data[k] < worth:
+        if kind != AGE and data[k] < worth and not (kind == TOUR and u.quota == 0):
             score *= 1e-3
         if score > best:
             best = score
@@ -316,6 +327,29 @@ def _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             if other < slots or (other == slots and j < i):
                 return True
     return False
+
+
+@inlined
+def _score_by_turn(mission, i, data, sensor, position):
+    """How many slots a node has waited for its turn; on a tie the first of the circuit is ahead.
+
+    Of a node that is served and cannot be emptied, the data that are left say how long it has
+    waited. A node of the part of another UAV counts for less than any of the own part.
+    """
+    waited = mission.slot + 1 - sensor.newest
+    expected = waited * sensor.rate
+    message = mission.message
+    if message == 0.0:
+        message = 1.0
+    spread_of_data = math.sqrt(expected * message)
+    if data + _SPREADS * spread_of_data < expected:
+        waited = data / sensor.rate
+    place = _circuit_position(mission, i, position)
+    score = waited + 0.1 / (1.0 + place)
+    end = (i + 1) * mission.nodes // mission.uavs
+    if place >= end - i * mission.nodes // mission.uavs:
+        score *= 1e-9
+    return score
 
 
 @inlined

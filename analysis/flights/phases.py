@@ -1,6 +1,6 @@
 """What each UAV of a mission does, one phase after the other: it flies, charges or stands."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -58,16 +58,12 @@ class Phase(NamedTuple):
         return len(self.visits) - 1
 
 
-def list_phases(
-    events: Events, scenario: Scenario, bases: Collection[int] = ()
-) -> list[list[Phase]]:
-    """The phases of each UAV.
+def list_phases(events: Events, scenario: Scenario) -> list[list[Phase]]:
+    """The phases of each UAV; who moves from one cell of a zone to another stands there.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission, whose UAVs land.
-        bases: The numbers of zones that are one place: who moves from one of its cells to another
-            stands there.
 
     Raises:
         InputError: If a UAV fails, or does not end its mission on the ground.
@@ -85,19 +81,17 @@ def list_phases(
             end = slots[-1].number + 1
             battery = (int(levels[uav, start]), int(levels[uav, end]))
             phases.append(Phase(uav, kind, start, end, battery, tuple(_list_visits(slots, kind))))
-        of_uavs.append([*_without_hops(phases, scenario, bases)])
+        of_uavs.append([*_without_hops(phases, scenario)])
     return of_uavs
 
 
-def _without_hops(
-    phases: list[Phase], scenario: Scenario, bases: Collection[int]
-) -> Iterator[Phase]:
-    """The phases; a UAV that moves within a base stands there."""
+def _without_hops(phases: list[Phase], scenario: Scenario) -> Iterator[Phase]:
+    """The phases; a UAV that moves within a zone stands there."""
     zones = scenario.chart.zones
     pending: Phase | None = None
     for phase in phases:
         visited = {int(zones[y, x]) for (x, y), _ in phase.visits}
-        is_hop = len(visited) == 1 and visited <= {*bases}
+        is_hop = len(visited) == 1 and min(visited) >= 0
         if phase.kind == STANDING or (phase.kind == FLIGHT and is_hop):
             standing = phase._replace(kind=STANDING, visits=phase.visits[-1:])
             if pending:

@@ -1,26 +1,26 @@
-"""The ways of UAVs on the Earth: way points in degrees, their lengths and times, and who is near.
+"""The ways of UAVs on the Earth: way points in degrees, their lengths, times and altitudes.
 
 A flight keeps of its cells those where it turns or hovers. A way point lies in its cell, so a
 straight way between two of them stays in the row or column of open cells that was simulated.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from dess.analysis.flights.phases import Phase, Visit
 from dess.physics.chart import Cell
+from dess.physics.consumption import PERCENT
 from dess.physics.fleet import type_of
 from dess.scenario.own_sea import Positions
 from dess.scenario.places import EARTH_RADIUS, Projection
 from dess.scenario.scenario import Scenario
 
-CLEARANCE = 5.0  # by which each UAV flies higher than the one before it [m]
+_EDGE = 1e-4  # of a cell, by which a place may be rounded off it [cells]
 _DECIMALS = 7  # of degrees, as MAVLink has them: about 1 cm
 
 
@@ -64,47 +64,115 @@ class WayPoint(NamedTuple):
     shift: float
 
 
+class Moment(NamedTuple):
+    """Where a UAV is at a time.
+
+    Attributes:
+        seconds: The time, from the start of the mission.
+        place: Where it is.
+        altitude: Above the places where UAVs stand [m].
+    """
+
+    seconds: float
+    place: Place
+    altitude: float
+
+
+class Craft(NamedTuple):
+    """How a UAV flies in a plan.
+
+    Attributes:
+        altitude: Its own altitude [m].
+        speed: Ground speed [m/s].
+        climb: Rate of climb and of descent [m/s].
+        hovering: What hovering takes of the battery [%/s].
+        climbing: What climbing takes of it [%/s].
+    """
+
+    altitude: float
+    speed: float
+    climb: float
+    hovering: float
+    climbing: float
+
+    @classmethod
+    def of(cls, scenario: Scenario, uav: int, altitude: float) -> "Craft":
+        """That of a UAV of a scenario with a data sheet."""
+        units = scenario.units
+        assert units
+        sheet = scenario.data_sheet
+        slots_per_cell = type_of(scenario.fleet, uav).slots_per_cell
+        speed = units.cell / units.slot / slots_per_cell
+        climb = sheet.number("climb")
+        hovering = scenario.consumption.slots[slots_per_cell - 1][-1] / PERCENT
+        # The wind makes hovering dearer; a climb takes so much more than hovering in still air.
+        extra = (sheet.wing.climbing_power(climb) - 1) / sheet.wing.power(speed)
+        return cls(
+            altitude,
+            round(speed, 6),
+            climb,
+            hovering / units.slot,
+            (hovering + extra) / units.slot,
+        )
+
+    @property
+    def vertical_seconds(self) -> float:
+        """How long it climbs, and how long it descends."""
+        return self.altitude / self.climb
+
+    @property
+    def vertical_battery(self) -> float:
+        """What a climb and a descent, which counts as hovering, take of the battery [%]."""
+        return self.vertical_seconds * (self.climbing + self.hovering)
+
+
 @dataclass(frozen=True)
 class Route:
     """The way of a flight.
 
     Attributes:
-        phase: The flight in the simulation.
+        phase: The flight in the simulation; None for a move between two places of a zone, which the
+            simulation does not have.
+        uav: The number of the UAV, from 0.
+        craft: How it flies.
         start: When it begins, from the start of the mission [s].
+        points: Its way points, from that of the take-off to that of the landing.
         simulated_seconds: How long it takes in the simulation.
         simulated_metres: How long its way is in the simulation.
-        speed: Ground speed [m/s].
-        altitude: Above the place of the take-off [m].
-        points: Its way points, from that of the take-off to that of the landing.
+        held: How long it waits in the air until the way is free [s].
     """
 
-    phase: Phase
+    phase: Phase | None
+    uav: int
+    craft: Craft
     start: float
-    simulated_seconds: float
-    simulated_metres: float
-    speed: float
-    altitude: float
     points: tuple[WayPoint, ...]
+    simulated_seconds: float = 0.0
+    simulated_metres: float = 0.0
+    held: float = 0.0
 
     @cached_property
-    def times(self) -> tuple[tuple[float, Place], ...]:
-        """When the UAV is where [s]: it arrives at each way point, and departs from it."""
+    def moments(self) -> tuple[Moment, ...]:
+        """When the UAV is where: it climbs, flies at its altitude, and descends."""
+        altitude = self.craft.altitude
+        place = self.points[0].place
         time = self.start
-        times = []
-        before = self.points[0].place
+        moments = [Moment(time, place, 0.0)]
+        time += self.craft.vertical_seconds
         for point in self.points:
-            time += before.distance_to(point.place) / self.speed
-            times.append((time, point.place))
+            time += place.distance_to(point.place) / self.craft.speed
+            place = point.place
+            moments.append(Moment(time, place, altitude))
             if point.seconds:
                 time += point.seconds
-                times.append((time, point.place))
-            before = point.place
-        return tuple(times)
+                moments.append(Moment(time, place, altitude))
+        moments.append(Moment(time + self.craft.vertical_seconds, place, 0.0))
+        return tuple(moments)
 
     @property
     def end(self) -> float:
         """When it ends, from the start of the mission [s]."""
-        return self.times[-1][0]
+        return self.moments[-1].seconds
 
     @property
     def seconds(self) -> float:
@@ -113,7 +181,7 @@ class Route:
 
     @property
     def metres(self) -> float:
-        """How long its way is."""
+        """How long its way is, without climb and descent."""
         places = [point.place for point in self.points]
         return math.fsum(map(Place.distance_to, places, places[1:]))
 
@@ -128,24 +196,18 @@ class Route:
         return max(self.points[0].shift, self.points[-1].shift)
 
     @property
-    def battery_end(self) -> float:
-        """The battery at the landing, if the whole way costs as much as in the simulation [%]."""
-        first, last = self.phase.battery
-        return first - (first - last) * self.seconds / self.simulated_seconds
+    def battery(self) -> float:
+        """What it takes of the battery [%].
 
-
-class Approach(NamedTuple):
-    """How near two UAVs are at a time.
-
-    Attributes:
-        metres: Their distance.
-        seconds: The time, from the start of the mission.
-        routes: Their flights.
-    """
-
-    metres: float
-    seconds: float
-    routes: tuple[Route, Route]
+        A second of the way takes what it does in the simulation; climb, descent and waiting are
+        added.
+        """
+        way = 0.0
+        if self.phase:
+            before, after = self.phase.battery
+            seconds = self.seconds - 2 * self.craft.vertical_seconds - self.held
+            way = (before - after) * seconds / self.simulated_seconds
+        return way + self.craft.vertical_battery + self.craft.hovering * self.held
 
 
 class SeaMap:
@@ -159,11 +221,6 @@ class SeaMap:
         self._positions = positions
         self.projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
 
-    @property
-    def bases(self) -> set[int]:
-        """The numbers of the zones that are one place, since they were typed in degrees."""
-        return {*self._positions.zones}
-
     def place_at(self, x: float, y: float) -> Place:
         """A place on the grid [cells]."""
         [(lon, lat)] = self.projection.degrees(np.array([[x, y]], float))
@@ -173,12 +230,20 @@ class SeaMap:
         """The middle of a cell."""
         return self.place_at(cell[0] + 0.5, cell[1] + 0.5)
 
+    def spots(self, places: Sequence[Place]) -> np.ndarray:
+        """(N, 2) places on the grid [cells]."""
+        return self.projection.cells(np.array(places, float).reshape(-1, 2))
+
     def place_of_zone(self, number: int) -> Place:
         """The place of a zone: where it was typed, or else the middle of its cells."""
         if number in self._positions.zones:
             return Place.of(*self._positions.zones[number])
         x, y, width, height = self.scenario.rectangles[number]
         return self.place_at(x + width / 2, y + height / 2)
+
+    def zone_of(self, cell: Cell) -> int:
+        """The number of the zone of a cell."""
+        return int(self.scenario.chart.zones[cell[1], cell[0]])
 
     def in_zones(self, spots: np.ndarray) -> np.ndarray:
         """(N,) whether places on the grid [cells] are in a zone."""
@@ -194,51 +259,40 @@ class SeaMap:
         latitudes = np.radians((degrees[:, 1] + others_in_degrees[:, 1]) / 2)
         return step * np.stack([np.cos(latitudes), np.ones_like(latitudes)], axis=1)
 
-    def place_on_ground(self, cell: Cell) -> Place:
-        """Where a UAV stands that is in a cell of a zone."""
-        number = self._zone_of(cell)
-        if number in self.bases:
-            return self.place_of_zone(number)
-        return self.middle_of(cell)
-
-    def plan_route(self, flight: Phase) -> Route:
-        """The way of a flight."""
-        kind = type_of(self.scenario.fleet, flight.uav)
+    def begin_way(self, flight: Phase, place: Place) -> tuple[WayPoint, ...]:
+        """The way of a flight from the place of its take-off to before the zone of its landing."""
         cells = [visit.cell for visit in flight.visits]
-        first = self._last_in_base(cells)
-        last = len(cells) - 1 - self._last_in_base(cells[::-1])
-        way = flight.visits[first : last + 1]
-        points = [
-            *self._leave_ground(cells[0], cells[first]),
-            *map(self._way_point, _turns_and_stops(way)),
-            *reversed(self._leave_ground(cells[-1], cells[last])),
-        ]
-        return Route(
-            flight,
-            flight.start * self._units.slot,
-            (flight.end - flight.start) * self._units.slot,
-            flight.moves * self.scenario.cell_size,
-            round(self._units.cell / self._units.slot / kind.slots_per_cell, 6),
-            self.scenario.altitude + CLEARANCE * flight.uav,
-            tuple(points),
+        first, last = self._ends_in_the_open(cells)
+        return (
+            *self._leave_zone(place, cells[0], cells[first]),
+            *map(self._way_point, _turns_and_stops(flight.visits[first : last + 1])),
         )
 
-    def _zone_of(self, cell: Cell) -> int:
-        return int(self.scenario.chart.zones[cell[1], cell[0]])
+    def end_way(self, flight: Phase, place: Place, hold: float) -> tuple[WayPoint, ...]:
+        """The rest of a flight: it waits before the zone for a time [s], and lands at a place."""
+        cells = [visit.cell for visit in flight.visits]
+        _, last = self._ends_in_the_open(cells)
+        points = [*reversed(self._leave_zone(place, cells[-1], cells[last]))]
+        if hold:
+            points.insert(0, WayPoint(self.middle_of(cells[last - 1]), hold, 0.0))
+        return tuple(points)
 
-    def _last_in_base(self, cells: list[Cell]) -> int:
-        """The number of the cell from which a UAV leaves the base where it has taken off."""
-        base = self._zone_of(cells[0])
-        if base not in self.bases:
-            return 0
-        return next(n for n, cell in enumerate(cells) if self._zone_of(cell) != base) - 1
+    def _ends_in_the_open(self, cells: list[Cell]) -> tuple[int, int]:
+        """The numbers of the last cell in the zone of the take-off, and of the first at the end."""
+        first = self._last_in_zone(cells)
+        last = len(cells) - 1 - self._last_in_zone(cells[::-1])
+        return first, last
 
-    def _leave_ground(self, cell: Cell, border: Cell) -> list[WayPoint]:
-        """The take-off from a cell, and the way to the middle of a cell at the zone's border."""
-        place = self.place_on_ground(cell)
+    def _last_in_zone(self, cells: list[Cell]) -> int:
+        """The number of the cell from which a UAV leaves the zone where it has taken off."""
+        zone = self.zone_of(cells[0])
+        return next(n for n, cell in enumerate(cells) if self.zone_of(cell) != zone) - 1
+
+    def _leave_zone(self, place: Place, cell: Cell, border: Cell) -> list[WayPoint]:
+        """The take-off from a place, and the way to the middle of a cell at the zone's border."""
         points = [WayPoint(place, 0.0, place.distance_to(self.middle_of(cell)))]
-        [spot] = self.projection.cells(np.array([place]))
-        if tuple(np.floor(spot)) != border:
+        [spot] = self.spots([place])
+        if np.abs(spot - border - 0.5).max() > 0.5 + _EDGE:
             points.append(WayPoint(self.middle_of(border), 0.0, 0.0))
         return points
 
@@ -262,84 +316,3 @@ def _turns_and_stops(visits: Sequence[Visit]) -> Iterator[Visit]:
 
 def _step_between(source: Visit, target: Visit) -> tuple[int, int]:
     return target.cell[0] - source.cell[0], target.cell[1] - source.cell[1]
-
-
-def closest_approach(
-    routes: Iterable[Route], sea: SeaMap, outside_zones: bool = False
-) -> Approach | None:
-    """When two UAVs in flight are nearest to each other; None if no two are.
-
-    Each flies at its own altitude from its take-off to its landing; climbs are left out.
-
-    Args:
-        routes: The flights of all UAVs.
-        sea: Where they are.
-        outside_zones: Whether only the time counts in which both UAVs are outside of all zones.
-    """
-    nearest: Approach | None = None
-    tracks = [_Track.of(route, sea) for route in routes]
-    for pair in combinations(tracks, 2):
-        if pair[0].route.phase.uav == pair[1].route.phase.uav:
-            continue
-        approach = _find_approach(*pair, outside_zones)
-        if approach and (nearest is None or approach.metres < nearest.metres):
-            nearest = approach
-    return nearest
-
-
-class _Track(NamedTuple):
-    """Where a UAV is at some times of a flight.
-
-    Attributes:
-        route: The flight.
-        times: (T,) [s].
-        spots: (T, 2) places on the grid [cells].
-        sea: Where this is.
-    """
-
-    route: Route
-    times: np.ndarray
-    spots: np.ndarray
-    sea: SeaMap
-
-    @classmethod
-    def of(cls, route: Route, sea: SeaMap) -> "_Track":
-        times, places = zip(*route.times, strict=True)
-        return cls(route, np.array(times), sea.projection.cells(np.array(places)), sea)
-
-    def spots_at(self, times: np.ndarray) -> np.ndarray:
-        """(N, 2) places on the grid at N times."""
-        axes = [np.interp(times, self.times, axis) for axis in self.spots.T]
-        return np.stack(axes, axis=1)
-
-
-def _find_approach(track: _Track, other: _Track, outside_zones: bool) -> Approach | None:
-    """When two UAVs are nearest to each other in the time in which both fly."""
-    start = max(track.times[0], other.times[0])
-    end = min(track.times[-1], other.times[-1])
-    if start > end:
-        return None
-    sea = track.sea
-    # Fine enough to say for each part whether it lies in a zone.
-    count = 2 + int((end - start) * track.route.speed / sea.scenario.cell_size * 4)
-    joined = np.concatenate([track.times, other.times, np.linspace(start, end, count)])
-    times = np.unique(np.clip(joined, start, end))
-    if len(times) == 1:
-        times = np.repeat(times, 2)
-    spots = track.spots_at(times)
-    others = other.spots_at(times)
-    away = sea.metres_between(spots, others)
-    step = np.diff(away, axis=0)
-    length = (step * step).sum(axis=1)
-    towards = -(away[:-1] * step).sum(axis=1)
-    shares = np.clip(np.divide(towards, length, out=np.zeros_like(length), where=length > 0), 0, 1)
-    across = np.linalg.norm(away[:-1] + shares[:, None] * step, axis=1)
-    distances = np.hypot(across, track.route.altitude - other.route.altitude)
-    if outside_zones:
-        in_zone = sea.in_zones(spots) | sea.in_zones(others)
-        distances[in_zone[:-1] | in_zone[1:]] = np.inf
-    best = int(distances.argmin())
-    if not np.isfinite(distances[best]):
-        return None
-    time = times[best] + shares[best] * (times[best + 1] - times[best])
-    return Approach(float(distances[best]), float(time), (track.route, other.route))

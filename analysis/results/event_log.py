@@ -1,7 +1,7 @@
 """Event logs of missions as arrays: what they say of the end of a UAV, and its path for maps."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, TypeAlias
 
@@ -55,6 +55,21 @@ def battery_levels(events: Events) -> pd.DataFrame:
     levels = states[["uav", "time", "value"]].rename(columns={"value": "battery"})
     levels = levels.astype({"time": int, "battery": int})
     return levels.sort_values(["uav", "time"], ignore_index=True)
+
+
+def battery_from_full(battery: Any, scenario: Scenario, uav: int) -> Any:
+    """What a UAV shows of its own battery [%], which in the model begins above the reserve.
+
+    Args:
+        battery: The battery in the model [%], a number or an array.
+        scenario: The scenario of the mission.
+        uav: The number of the UAV, from 0.
+    """
+    if not scenario.data_sheet.is_on:
+        return battery
+    full = scenario.data_sheet.fields()["charge_complete"]
+    usable = scenario.battery_of_type(type_of(scenario.fleet, uav)) or full
+    return 100 - full + battery * (full / usable)
 
 
 def residual_data(events: Events) -> pd.DataFrame:
@@ -188,13 +203,12 @@ def _slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
     return set(zip(rows["uav"], rows["time"].astype(int), strict=True))
 
 
-def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> list[str]:
+def causes_of_failure(events: Events, scenario: Scenario) -> list[str]:
     """A sentence per UAV that did not fill its quota, or did not land, without a full stop.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
         scenario: The scenario of the mission.
-        first: The number of the first UAV, as in what stands beside the sentences.
     """
     log = pd.DataFrame(events)
     if scenario.landing:
@@ -208,12 +222,10 @@ def causes_of_failure(events: Events, scenario: Scenario, first: int = 1) -> lis
     starts = levels.rename(columns={"time": "slot", "battery": "before"})
     slots = slots.merge(starts, on=["uav", "slot"])
     failed = (uav for uav in range(scenario.uavs) if uav not in ended)
-    return [_cause_of_uav(log, slots, scenario, uav, first) for uav in failed]
+    return [_cause_of_uav(log, slots, scenario, uav) for uav in failed]
 
 
-def _cause_of_uav(
-    log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int, first: int
-) -> str:
+def _cause_of_uav(log: pd.DataFrame, slots: pd.DataFrame, scenario: Scenario, uav: int) -> str:
     rows_of_uav = log[log["uav"] == uav]
     flown = slots[slots["uav"] == uav]
     kind = type_of(scenario.fleet, uav)
@@ -225,7 +237,7 @@ def _cause_of_uav(
         to_go = f"with {to_go} communication slots to go"
     else:
         to_go = "without having landed"
-    name = f"UAV {first + uav}"
+    name = f"UAV {uav + 1}"
     cell = f"after {after} slots at ({last['x']}, {last['y']})"
     if not (rows_of_uav["event"] == "battery_empty").any():
         if after == scenario.max_slots:
@@ -259,7 +271,7 @@ def _cause_of_uav(
         in_zone = charging["slot"].isin(rows["slot"]) & (
             zones[charging["y"], charging["x"]] == zone
         )
-        busy = f", while {_uavs_in_words(charging['uav'][in_zone], first)} charged there"
+        busy = f", while {_uavs_in_words(charging['uav'][in_zone])} charged there"
         x, y, *_ = scenario.rectangles[zone]
         facts.append(
             f"it waited {numbers.format_count(len(rows), 'slot')} for a pad of the zone at ({x}, "
@@ -269,13 +281,13 @@ def _cause_of_uav(
     overruled = overruled["other"][overruled["time"] >= flown["slot"].min()]
     if len(overruled):
         times = numbers.format_count(len(overruled), "time")
-        facts.append(f"it was overruled {times}, by {_uavs_in_words(overruled, first)}")
+        facts.append(f"it was overruled {times}, by {_uavs_in_words(overruled)}")
     return "; ".join(facts)
 
 
-def _uavs_in_words(uavs: pd.Series, first: int) -> str:
-    """Several UAVs as ``UAVs 1 and 3``."""
-    shown = [str(first + uav) for uav in sorted(set(uavs))]
+def _uavs_in_words(uavs: pd.Series) -> str:
+    """Several UAVs as ``UAVs 1 and 3``, counted from 1."""
+    shown = [str(uav + 1) for uav in sorted(set(uavs))]
     if len(shown) == 1:
         return f"UAV {shown[0]}"
     return f"UAVs {numbers.join_words(shown)}"
@@ -289,37 +301,76 @@ _GPX = """<?xml version='1.0' encoding='UTF-8'?>
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def paths_of(events: Events, scenario: Scenario) -> pd.DataFrame:
+def paths_of(
+    events: Events, scenario: Scenario, altitudes: Sequence[float] | None = None
+) -> pd.DataFrame:
     """Where every UAV was at the start of every mission slot, and at its end.
 
+    Args:
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
+        scenario: The scenario of the mission.
+        altitudes: Those of the UAVs in the air [m], where each has its own; otherwise that of the
+            scenario.
+
     Returns:
-        One row per UAV and time, in that order: ``uav``; ``time`` [mission slots]; ``seconds``, the
-        same time [s], if the scenario has a data sheet; ``x, y``, the place on the grid [cells],
-        where a whole number is the middle of a cell; ``lon, lat`` [degrees], if the sea has them;
-        ``altitude`` [m]; ``battery`` [%].
+        One row per UAV and time, in that order: ``uav`` from 1 on; ``time`` [mission slots];
+        ``seconds``, the same time [s], if the scenario has a data sheet; ``x, y``, the place on the
+        grid [cells], where a whole number is the middle of a cell; ``lon, lat`` [degrees], if the
+        sea has them; ``altitude`` [m], 0 on the ground; ``battery`` [%] of a full one.
     """
+    if altitudes is None:
+        altitudes = [scenario.altitude] * scenario.uavs
     table = battery_levels(events)
     slots = uav_slots(events)
-    for axis in ("x", "y"):
-        for uav, of_uav in slots.groupby("uav"):
-            moves = of_uav[of_uav["moved"]]
-            last = type_of(scenario.fleet, int(uav)).slots_per_cell
-            times = np.stack([moves["slot"], moves["slot"] + last], axis=1).ravel()
+    for uav, of_uav in slots.groupby("uav"):
+        rows = table["uav"] == uav
+        moves = of_uav[of_uav["moved"]]
+        last = type_of(scenario.fleet, int(uav)).slots_per_cell
+        times = np.stack([moves["slot"], moves["slot"] + last], axis=1).ravel()
+        for axis in ("x", "y"):
             cells = moves[[f"from_{axis}", axis]].to_numpy().ravel()
             first = of_uav[f"from_{axis}"].iloc[0]
-            rows = table["uav"] == uav
             places = np.interp(table["time"][rows], [0, *times], [first, *cells])
             table.loc[rows, axis] = places
+        on_ground = _is_on_ground(of_uav, scenario, last)
+        altitude = np.where(on_ground, 0.0, altitudes[int(uav)])
+        table.loc[rows, "altitude"] = altitude[: rows.sum()]
+        battery = table.loc[rows, "battery"].to_numpy()
+        table.loc[rows, "percent"] = battery_from_full(battery, scenario, int(uav))
     if scenario.centre:
         projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
         table[["lon", "lat"]] = projection.degrees(table[["x", "y"]].to_numpy() + 0.5)
-    table.insert(len(table.columns), "altitude", scenario.altitude)
+    table["battery"] = table.pop("percent").round(1)
+    table["uav"] += 1
     if scenario.units:
         table.insert(2, "seconds", table["time"] * scenario.units.slot)
-    return table[[*table.columns.drop("battery"), "battery"]]
+    at_end = ["altitude", "battery"]
+    return table[[*table.columns.drop(at_end), *at_end]]
 
 
-def path_text(events: Events, scenario: Scenario, kind: str, start: datetime | None = None) -> str:
+def _is_on_ground(slots: pd.DataFrame, scenario: Scenario, duration: int) -> np.ndarray:
+    """(T + 1,) whether a UAV is on the ground at the start of each slot, and at its end.
+
+    It is where it began, in slots in which it charges or is under repair, and with landing in those
+    in which it hovers in a zone.
+    """
+    zones = scenario.chart.zones[slots["y"], slots["x"]]
+    begins = slots["slot"].where(slots["moved"]).ffill().fillna(-duration)
+    is_moving = slots["slot"] < begins + duration
+    stands = slots["charging"] | slots["grounded"]
+    if scenario.landing:
+        stands |= (zones >= 0) & ~is_moving
+    first = scenario.landing or bool(stands.iloc[0])
+    return np.concatenate([[first], stands])
+
+
+def path_text(
+    events: Events,
+    scenario: Scenario,
+    kind: str,
+    start: datetime | None = None,
+    altitudes: Sequence[float] | None = None,
+) -> str:
     """The paths in a file.
 
     Args:
@@ -328,11 +379,12 @@ def path_text(events: Events, scenario: Scenario, kind: str, start: datetime | N
         kind: ``csv``, ``geojson``, with cells where the sea has no degrees, ``kml`` or ``gpx``.
         start: When the mission starts. Without it KML and GPX, which have times of days only, count
             from 1970 on. Without a data sheet, a mission slot is a second.
+        altitudes: As for ``paths_of``.
 
     Raises:
         InputError: If the mission lasts for longer than times of days go on.
     """
-    table = paths_of(events, scenario)
+    table = paths_of(events, scenario, altitudes)
     if start or kind in ("kml", "gpx"):
         table["utc"] = _moments(table, start or _EPOCH)
     if kind == "csv":
@@ -381,7 +433,7 @@ def _paths_as_kml(paths: dict[int, pd.DataFrame]) -> str:
         track = [f"<when>{moment}</when>" for moment in path["utc"]]
         track += ["<gx:coord>{} {} {}</gx:coord>".format(*at) for at in path.iloc[:, :3].to_numpy()]
         track.insert(0, "<altitudeMode>relativeToGround</altitudeMode>")
-        mark = f"<name>UAV {uav + 1}</name><gx:Track>{''.join(track)}</gx:Track>"
+        mark = f"<name>UAV {uav}</name><gx:Track>{''.join(track)}</gx:Track>"
         marks.append(f"<Placemark>{mark}</Placemark>")
     return f"{_KML}<Document>{''.join(marks)}</Document></kml>"
 
@@ -395,5 +447,5 @@ def _paths_as_gpx(paths: dict[int, pd.DataFrame]) -> str:
             f"<ele>{row.altitude}</ele><time>{row.utc}</time></trkpt>"
             for row in path.itertuples()
         ]
-        tracks.append(f"<trk><name>UAV {uav + 1}</name><trkseg>{''.join(points)}</trkseg></trk>")
+        tracks.append(f"<trk><name>UAV {uav}</name><trkseg>{''.join(points)}</trkseg></trk>")
     return f"{_GPX}{''.join(tracks)}</gpx>"

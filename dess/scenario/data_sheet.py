@@ -60,6 +60,7 @@ _ASSUMED = {
     "free_space": "1 m",
     "tip_speed": f"{TIP_SPEED:g} m/s",
     "induced_speed": f"{INDUCED_SPEED:g} m/s",
+    "climb": "3 m/s",
 }
 
 LORA = "lora"
@@ -172,6 +173,9 @@ class DataSheet(Section):
         0.1,
         100,
         "4.03 m/s",
+    )
+    climb: str | None = _quantity(
+        "m/s", "rate of climb and descent in plans, or else 3 m/s", 0.1, 100, "3 m/s"
     )
     charging: str | None = _quantity("s", "time to charge a battery from empty to full")
     reserve: str | None = _quantity("percent", "share of the battery that is never used", 0, 60)

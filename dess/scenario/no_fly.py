@@ -7,7 +7,8 @@ Of polygons, a cell is a no-fly cell if its centre lies in one of them, and not 
 ``touched``, every cell of which a part does. Points and lines close every cell that they touch, on
 an edge those of both sides; a line with a width, and a point with a ``radius`` of its own, every
 cell whose centre lies in the lane or the circle as well. A map in a text (``.txt``, ``.map``)
-has a line for each row of cells, one in a picture (``.png``) a pixel for each cell.
+has a line for each row of cells, one in a picture (``.png``) a pixel for each cell. Of a plan
+(``.plan``), the geofence closes cells, also those outside of what UAVs are kept in.
 """
 
 import io
@@ -73,7 +74,8 @@ def no_fly_in(
     """(H, W) whether a cell is a no-fly cell of a file; notes tell what closes none or is not read.
 
     Args:
-        path: A file ``.txt``, ``.map``, ``.png``, ``.csv``, ``.tsv``, ``.geojson`` or ``.json``.
+        path: A file ``.txt``, ``.map``, ``.png``, ``.csv``, ``.tsv``, ``.geojson``, ``.json`` or
+            ``.plan``.
         size: Cells of the grid from west to east and from north to south.
         projection: That of the sea, none if the nodes are cells.
         source: What is taken of the file.

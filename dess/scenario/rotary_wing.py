@@ -47,6 +47,16 @@ class RotaryWing(NamedTuple):
         of_inflow = 1 / (math.sqrt(1 + half * half) + half)
         return BLADES * (1 + 3 * of_tips) + INDUCED * math.sqrt(of_inflow)
 
+    def climbing_power(self, rate: float) -> float:
+        """The power of a climb at a rate [m/s], as a share of that of hovering in still air.
+
+        By momentum theory the flow through the rotor is ``c / 2 + sqrt(c^2 / 4 + v0^2)`` with the
+        induced speed v0 of hovering (Leishman, Principles of Helicopter Aerodynamics, 2nd edition,
+        section 2.13). That of the blades stays as it is.
+        """
+        half = rate / (2 * self.induced_speed)
+        return BLADES + INDUCED * (half + math.sqrt(half * half + 1))
+
     def with_power(self, airspeed: float, power: float) -> "RotaryWing":
         """The same with the drag of which the power at an airspeed [m/s] follows."""
         drag = (power - self.power_without_drag(airspeed)) / (airspeed * airspeed * airspeed)

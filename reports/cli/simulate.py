@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dess.analysis.flights.flight_plan import FlightPlan
+    from dess.analysis.flights.separation import Separation
     from dess.model.record import MissionRecord
     from dess.policies.registry import Policy
     from dess.scenario.own_sea import Positions
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 LOGS = (".parquet", ".csv")
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
+MOST_DISTANCE = 100  # of UAVs of a plan from each other [m]
 PATHS = (".geojson", ".kml", ".gpx", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
@@ -58,6 +60,8 @@ def simulate(
     animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
     path: Annotated[Path | None, typer.Option(metavar="FILE.geojson")] = None,
     plan: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    air_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "10 m",
+    ground_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "3 m",
     start: Annotated[str | None, typer.Option(metavar="TIME")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
@@ -81,6 +85,9 @@ def simulate(
         plan: Write each flight into this new folder, as a .plan that QGroundControl reads, and a
             table of them. The mission is simulated with forbid_swaps; the sea needs degrees and a
             data sheet.
+        air_distance: How far apart UAVs are if one of them is in the air, in a plan and in the
+            altitudes of paths; a plan with less is refused.
+        ground_distance: How far apart UAVs stand.
         start: Time of the start for --path and --plan, e.g. 2026-06-01T08:00Z.
     """
     from dess import simulate
@@ -91,7 +98,8 @@ def simulate(
     from dess.scenario.scenario import ScenarioSpace
 
     if of:
-        _refuse_given(context, "scenario", "settings", "seed")
+        allowed = "--of without --{}"
+        _refuse_given(context, ("scenario", "settings", "seed"), "comes from the study", allowed)
         asked = _read_study(of, point, policy, replication)
     elif point is not None:
         raise InputError("--point", "belongs to a study", "with --of DIR")
@@ -109,6 +117,11 @@ def simulate(
     if start is not None:
         begin = _parse_start(start, is_used=path is not None or plan is not None)
     positions = None
+    separation = _parse_separation(air_distance, ground_distance)
+    if plan is None and path is None:
+        options_of_plan = ("air_distance", "ground_distance")
+        allowed = "with --plan DIR or --path FILE"
+        _refuse_given(context, options_of_plan, "no output has altitudes", allowed)
     if plan is not None:
         positions = _prepare_plan(plan, asked, settings)
         asked = replace(asked, space=ScenarioSpace.of(asked.space, forbid_swaps=True))
@@ -137,7 +150,8 @@ def simulate(
             which = asked.seed, asked.replication
             has_log = bool(paths) or plan is not None or not as_json
             record = simulate(asked.space, asked.team, *which, events=has_log)
-        mission = _Mission(record, sample_scenario(asked.space, *which), asked.title, begin)
+        drawn = sample_scenario(asked.space, *which)
+        mission = _Mission(record, drawn, asked.title, separation, begin)
         for file, temporary in zip(paths, temporaries, strict=True):
             with writable(file):
                 writers[file](mission, temporary, file.suffix[1:].lower())
@@ -154,7 +168,7 @@ def simulate(
         if record.operations is not None:
             measured["operations"] = in_units
         if flight_plan:
-            measured["plan"] = flight_plan.summarise_errors()
+            measured["plan"] = flight_plan.summarise()
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(mission)
@@ -233,13 +247,13 @@ def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: 
     return given
 
 
-def _refuse_given(context: typer.Context, *names: str) -> None:
-    """Refuse options that a study answers."""
+def _refuse_given(context: typer.Context, names: Sequence[str], problem: str, allowed: str) -> None:
+    """Refuse options that do not fit to the others; ``allowed`` has a place for the option."""
     for name in names:
         source = context.get_parameter_source(name)
         if source and source.name != "DEFAULT":
-            option = _OPTION_OF.get(name, name)
-            raise InputError(f"--{option}", "comes from the study", f"--of without --{option}")
+            option = _OPTION_OF.get(name, name.replace("_", "-"))
+            raise InputError(f"--{option}", problem, allowed.format(option))
 
 
 @dataclass(frozen=True)
@@ -249,6 +263,7 @@ class _Mission:
     record: "MissionRecord"
     scenario: "Scenario"
     title: str
+    separation: "Separation"
     start: datetime | None = None
 
     @property
@@ -314,7 +329,11 @@ def _write_path(mission: _Mission, path: Path, kind: str) -> None:
     from dess.analysis.results.event_log import path_text
     from dess.base.files.writing import fill
 
-    fill(path, path_text(mission.log, mission.scenario, kind, mission.start).encode())
+    altitudes = None
+    if mission.scenario.units and mission.scenario.landing:
+        altitudes = mission.separation.altitudes(mission.scenario)
+    text = path_text(mission.log, mission.scenario, kind, mission.start, altitudes)
+    fill(path, text.encode())
 
 
 def _parse_start(text: str, *, is_used: bool) -> datetime:
@@ -365,11 +384,31 @@ def _open_folder(plan: Path | None) -> AbstractContextManager[Path | None]:
     return creating_folder(plan)
 
 
+def _parse_separation(air: str, ground: str) -> "Separation":
+    """How far apart UAVs have to be.
+
+    Raises:
+        InputError: If one of them is no length, or out of range.
+    """
+    from dess.analysis.flights.separation import Separation
+    from dess.scenario.quantities import quantity_of
+
+    metres = []
+    for option, text in (("--air-distance", air), ("--ground-distance", ground)):
+        length = quantity_of(text, option, "m")
+        if not 1 <= length <= MOST_DISTANCE:
+            raise InputError(option, f"{shown(text)} is out of range", f"1 m..{MOST_DISTANCE} m")
+        metres.append(length)
+    return Separation(*metres)
+
+
 def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "FlightPlan":
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.base.files.writing import fill
 
-    flight_plan = FlightPlan.of(mission.log, mission.scenario, positions, mission.start)
+    flight_plan = FlightPlan.of(
+        mission.log, mission.scenario, positions, mission.start, mission.separation
+    )
     for name, text in flight_plan.make_files().items():
         fill(folder / name, text)
     return flight_plan
@@ -421,12 +460,12 @@ def _print_mission(mission: _Mission) -> None:
         rows = [[label, f"{value:g}"] for label, value in labelled]
         console.print_table(["", "beyond the paper"], rows)
     uavs = mission.record.uav_rows()
-    rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
+    rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs, 1)]
     console.print_table(["UAV", *uavs[0]], rows)
     if names := mission.scenario.names:
         data = residual_data(mission.log).to_numpy()
         of_nodes = zip(names, mission.scenario.nodes, data[0], data[-1], strict=True)
         rows = [[name, str([*cell]), f"{had:g}", f"{left:g}"] for name, cell, had, left in of_nodes]
         console.print_table(["node", "cell", "data at the start", "at the end"], rows)
-    for cause in causes_of_failure(mission.log, mission.scenario, first=0):  # as in the table
+    for cause in causes_of_failure(mission.log, mission.scenario):
         console.print_text(f"{cause}.")

@@ -102,6 +102,29 @@ def test_tour_visits_every_node_once_around():
     assert steps in ({1}, {7})
 
 
+# Of a sea with four nodes about the zone, whose data never end.
+SHEET = {
+    **{"endurance": "30 min", "cruise": "10 m/s", "charging": "30 min", "horizon": "3 h"},
+    **{"bandwidth": "1 MHz", "snr": "20 dB at 100 m", "range": "400 m"},
+}
+
+
+@pytest.mark.parametrize("data_rate", ["1 MB/h", "10 GB/h"])
+def test_tour_goes_on_from_nodes_that_are_never_without_data(data_rate):
+    """At e1931ad2 a UAV stayed at the first node until it had to charge, and came back to it.
+
+    Of 10 GB/h no node can be emptied: there a visit ends when the others have more data.
+    """
+    nodes = [[2, 2], [9, 2], [9, 9], [2, 9]]
+    world = {"nodes": nodes, "grid": 12, "zone": [5, 5, 2, 2], "uavs": 1}
+    sheet = SHEET | {"data_rate": data_rate}
+    scenario = Scenario.of(data_sheet=sheet, **world)
+    log = simulate(scenario, policies.load("tour"), 3, events=True).events.columns()
+    is_served = log["event"] == "communication"
+    collected = np.bincount(log["node"][is_served], log["value"][is_served], len(nodes))
+    assert collected.min() > 0.5 * collected.max()
+
+
 # --- how good they are ---
 
 

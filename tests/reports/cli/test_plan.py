@@ -129,3 +129,44 @@ def test_tracks_have_the_times_of_day(dess, tmp_path, sea):
     assert np.allclose(places, written, rtol=0, atol=1e-9)
     assert dess(*AT_SEA, "--path", "p.gpx", "--json")[0] == 0
     assert "<time>1970-01-01T00:00:10Z</time>" in (tmp_path / "p.gpx").read_text()
+
+
+def test_tracks_say_what_a_pilot_reads(dess, tmp_path, sea):
+    """At e1931ad2: UAVs from 0, 80 % for a full battery, and 10 m high on the ground."""
+    sea.write_text(sea.read_text() + 'reserve = "20 %"\n')
+    assert dess(*AT_SEA, "--set", "uavs=2", "--path", "p.csv", "--json")[0] == 0
+    track = pd.read_csv(tmp_path / "p.csv")
+    assert [*track["uav"].unique()] == [1, 2]
+    for uav, rows in track.groupby("uav"):
+        assert rows["battery"].iloc[0] == 100 and rows["battery"].min() >= 20
+        assert rows["altitude"].iloc[0] == rows["altitude"].iloc[-1] == 0
+        assert {*rows["altitude"]} == {0, 10 + 11 * (uav - 1)}
+        in_cells = rows[["x", "y"]].to_numpy()
+        away = (in_cells[:, 1] > 0) | (in_cells[:, 0] > 1)
+        assert (rows["altitude"][away] > 0).all()
+    assert dess(*AT_SEA, "--path", "p.gpx", "--air-distance", "20 m", "--json")[0] == 0
+
+
+def test_uavs_have_the_numbers_of_their_files_in_the_printed_table(dess, sea):
+    out = dess(*AT_SEA, "--set", "uavs=2")[1]
+    lines = [line.split() for line in out.splitlines()]
+    first = next(n for n, line in enumerate(lines) if line[:2] == ["UAV", "quota"])
+    assert [line[0] for line in lines[first + 2 : first + 4]] == ["1", "2"]
+
+
+def test_distances_are_options_that_are_checked(refusal, dess, tmp_path, sea):
+    plan = ("--plan", "plans", "--set", "uavs=2")
+    assert "--air-distance: '10' has no unit" in refusal(*AT_SEA, *plan, "--air-distance", "10")
+    far = refusal(*AT_SEA, *plan, "--ground-distance", "2 km")
+    assert "--ground-distance: '2 km' is out of range; allowed: 1 m..100 m" in far
+    assert "no output has altitudes" in refusal(*AT_SEA, "--air-distance", "9 m")
+    assert dess(*AT_SEA, *plan, "--air-distance", "30 m", "--json")[0] == 0
+    table = pd.read_csv(tmp_path / "plans" / "plan.csv")
+    assert {*table["altitude"].dropna()} == {30, 61}
+
+
+def test_the_places_and_the_climb_are_printed(dess, sea):
+    out = dess(*AT_SEA, "--set", "uavs=2", "--set", "pads=1", "--plan", "plans")[1]
+    assert "UAVs climb and descend at 3 m/s, which is assumed" in out
+    assert "Places of zone 1 (latitude, longitude): pad 1 at 0.003" in out
+    assert "; place 2 at " in out

@@ -45,7 +45,7 @@ def test_single_missions_and_their_player_are_told_in_units(tmp_path, capsys):
     table, features, tracks = (
         path_text(record.events.columns(), scenario, kind) for kind in ("csv", "geojson", "kml")
     )
-    rows = pd.read_csv(io.StringIO(table)).query("uav == 0")
+    rows = pd.read_csv(io.StringIO(table)).query("uav == 1")
     assert rows["seconds"].tolist() == (SLOT * rows["time"]).tolist()
     times = json.loads(features)["features"][0]["properties"]
     assert times["times"] == rows["time"].tolist()
