@@ -296,7 +296,7 @@ def _cheapest_rule(
     price_of_uavs = max(prices.price_of_uavs(space, most_uavs) for space in spaces)
     fleet = prices.purchase_of(price_of_uavs, most_pads)
     worn = prices.pack / prices.pack_cycles
-    running = prices.paid_missions * (prices.charge + prices.hour + prices.lost_uav + worn)
+    running = prices.paid_missions * (prices.charge + prices.hour + (prices.lost_uav or 0.0) + worn)
     if not fleet and not running:
         raise InputError("prices", "all are 0", "one or more above 0")
     rule = {

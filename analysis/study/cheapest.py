@@ -295,7 +295,7 @@ class Setting(NamedTuple):
     @classmethod
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
-        loss = costs.of_lost(space.uavs[1])
+        loss = costs.loss_of_fleets(space)
         return cls(values, loss, horizon_of(space), costs.unit)
 
 

@@ -40,7 +40,8 @@ class Costs(StrictTable):
     """Prices in one currency.
 
     UAVs and pads are bought once. Charging, hours and lost UAVs are paid for in each of the
-    ``missions`` planned for the fleet.
+    ``missions`` planned for the fleet. Where missions are paid for, a lost UAV costs what it was
+    bought for, unless ``lost_uav`` says what it costs.
 
     With ``years``, costs are those of a year with ``days`` missions: UAVs and pads are paid off by
     equal amounts, and worn battery packs are replaced.
@@ -55,10 +56,10 @@ class Costs(StrictTable):
     pad: Price = Field(0.0, description="price of a charging pad")
     charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")
     hour: Price = Field(0.0, description="price of an hour of a mission")
-    lost_uav: Price = Field(
-        0.0,
+    lost_uav: Price | None = Field(
+        None,
         description="price of a lost UAV: its battery is depleted, it has failed for good, or it "
-        "floats out at sea at the end",
+        "floats out at sea at the end; what it was bought for, where missions are paid for",
     )
     missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
     slot_seconds: Number | None = Field(
@@ -123,7 +124,15 @@ class Costs(StrictTable):
     @property
     def pays_for_missions(self) -> bool:
         """Whether missions have a price, not the purchase alone."""
-        return any((self.charge, self.hour, self.lost_uav, self.pack))
+        return any((self.charge, self.hour, self.pays_for_losses, self.pack))
+
+    @property
+    def pays_for_losses(self) -> bool:
+        """Whether a lost UAV costs anything."""
+        if self.lost_uav is not None:
+            return self.lost_uav > 0
+        plans_missions = self.years is not None or self.missions > 1
+        return plans_missions or any((self.charge, self.hour, self.pack))
 
     @property
     def unit(self) -> str:
@@ -131,6 +140,13 @@ class Costs(StrictTable):
         if self.years is None:
             return self.currency
         return f"{self.currency} a year"
+
+    @property
+    def paid_parts(self) -> set[str]:
+        """The parts of ``part_names`` that have a price, beside the purchase."""
+        prices = {"packs": self.pack, "charging": self.charge, "hours": self.hour}
+        prices["losses"] = float(self.pays_for_losses)
+        return {part for part, price in prices.items() if price}
 
     @property
     def part_names(self) -> tuple[str, ...]:
@@ -158,6 +174,8 @@ class Costs(StrictTable):
                 continue
             value = getattr(self, price)
             is_of_a_year = price in _OF_A_YEAR
+            if price == "lost_uav" and value is None and self.pays_for_losses:
+                continue
             if value:
                 paid.append(f"{numbers.format_money(value, self.currency)} for {thing}")
             elif self.years is not None or not is_of_a_year:
@@ -169,6 +187,8 @@ class Costs(StrictTable):
             text += f" The fleet is to make {numbers.format_count(self.missions, 'mission')}."
         if free:
             text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
+        if self.lost_uav is None and self.pays_for_losses:
+            text += " A lost UAV costs what it was bought for."
         return text
 
     @property
@@ -232,9 +252,17 @@ class Costs(StrictTable):
             return price / self.years
         return price * self.interest / -math.expm1(-self.years * math.log1p(self.interest))
 
-    def of_lost(self, uavs: Any) -> Any:
-        """What it costs if every mission loses this number of UAVs, in the currency."""
-        return self.paid_missions * self.lost_uav * uavs
+    def prices_of_lost_uavs(self, space: ScenarioSpace, uavs: int) -> list[float]:
+        """What it costs to lose each of the first UAVs of a scenario."""
+        if not self.pays_for_losses:
+            return [0.0] * uavs
+        if self.lost_uav is not None:
+            return [self.lost_uav] * uavs
+        return self.prices_of_uavs(space, uavs)
+
+    def loss_of_fleets(self, space: ScenarioSpace) -> float:
+        """What it costs if every mission loses the largest fleet of a scenario, in the currency."""
+        return self.paid_missions * sum(self.prices_of_lost_uavs(space, space.uavs[1]))
 
     def most_running(
         self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]
@@ -251,7 +279,8 @@ class Costs(StrictTable):
         slots = np.array([space.max_slots for space in spaces])
         hours = slots * [self.seconds_per_slot(space) / 3600 for space in spaces]
         spent = slots * [most_battery_per_slot(space) / 100 for space in spaces]
-        of_uav = self.lost_uav + (self.charge + self.pack / self.pack_cycles) * spent
+        lost = np.array([max(self.prices_of_lost_uavs(space, space.uavs[1])) for space in spaces])
+        of_uav = lost + (self.charge + self.pack / self.pack_cycles) * spent
         of_fleet = of_uav[points] * np.asarray(missions["uavs"])
         return self.paid_missions * (of_fleet + self.hour * hours[points])
 
@@ -284,14 +313,19 @@ class Costs(StrictTable):
         mission = np.repeat(np.arange(len(fleet)), fleet)
         pads = np.array([space.charging_pads for space in spaces])
         price_of_battery = self.charge or self.pack
-        charged = self._sum_of(uavs, "charged", mission, len(fleet), price_of_battery)
-        lost = self._sum_of(uavs, "down", mission, len(fleet), self.lost_uav)
+        charged: np.ndarray = np.zeros(len(fleet))
+        if price_of_battery:
+            charged = np.bincount(mission, _recorded(uavs, "charged"), len(fleet))
+        losses: np.ndarray = np.zeros(len(fleet))
+        if self.pays_for_losses:
+            prices = self._prices_of_losses(spaces, missions)
+            losses = np.bincount(mission, prices * _recorded(uavs, "down"), len(fleet))
         seconds = [self.seconds_per_slot(space) for space in spaces]
         hours = np.asarray(missions["slots"]) * np.array(seconds)[points] / 3600
         of_uavs = self._prices_of_fleets(spaces, points, fleet)
         amounts = {PURCHASE: self.purchase_of(of_uavs, pads[points])}
         if self.years is not None:
-            emptied = np.zeros(len(fleet))
+            emptied: np.ndarray = np.zeros(len(fleet))
             if price_of_battery:  # the recharge after the mission is paid for, too
                 spent = spent_battery(spaces, missions, uavs)
                 charged = np.bincount(mission, spent, len(fleet))
@@ -300,7 +334,7 @@ class Costs(StrictTable):
         return amounts | {
             "charging": self.paid_missions * self.charge * charged / 100,
             "hours": self.paid_missions * self.hour * hours,
-            "losses": self.paid_missions * self.lost_uav * lost,
+            "losses": self.paid_missions * losses,
         }
 
     def _prices_of_fleets(
@@ -315,20 +349,28 @@ class Costs(StrictTable):
                 prices[at_point] = np.array(totals)[fleet[at_point]]
         return prices
 
-    @staticmethod
-    def _sum_of(
-        uavs: Mapping[str, Any], field: str, mission: np.ndarray, missions: int, price: float
+    def _prices_of_losses(
+        self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]
     ) -> np.ndarray:
-        """(n,) sums of a field over the UAVs of every mission; 0 if it has no price."""
-        if not price:
-            return np.zeros(missions)
-        if field not in uavs or np.isnan(np.asarray(uavs[field], float)).any():
-            raise InputError(
-                "costs",
-                f"the records of an earlier version have no {field}, which has a price",
-                "results of this version, in another results folder",
-            )
-        return np.bincount(mission, np.asarray(uavs[field]), missions)
+        """(u,) what it costs to lose each UAV of the missions."""
+        most = max(space.uavs[1] for space in spaces)
+        prices = np.array([self.prices_of_lost_uavs(space, most) for space in spaces])
+        return prices[_places_of_uavs(missions)]
+
+
+def _recorded(uavs: Mapping[str, Any], field: str) -> np.ndarray:
+    """(u,) a field of the records of UAVs.
+
+    Raises:
+        InputError: If records of before lack it.
+    """
+    if field not in uavs or np.isnan(np.asarray(uavs[field], float)).any():
+        raise InputError(
+            "costs",
+            f"the records of an earlier version have no {field}, which has a price",
+            "results of this version, in another results folder",
+        )
+    return np.asarray(uavs[field])
 
 
 def has_priced_types(space: ScenarioSpace) -> bool:

@@ -45,7 +45,8 @@ METRICS = (
     "cost",
 )
 _MEASURED, _COST = 5, len(METRICS) - 1
-# What ``prices`` has: prices and missions of ``study.prices.Costs``, and the seconds of a slot.
+# What ``prices`` has: prices and missions of ``study.prices.Costs``, and the seconds of a slot. The
+# price of a lost UAV is nan if it is what the UAV was bought for.
 PRICES = ("uav", "pad", "charge", "hour", "lost_uav", "missions", "seconds")
 # The sums of ``totals``, for each metric over the missions that have it.
 TOTALS = ("count", "sum", "squares", "least", "most")
@@ -335,30 +336,44 @@ def _cost(prices, uav_prices, pads, record, uavs):
     """The cost of a mission, summed up from the parts of ``dess.analysis.study.prices``."""
     charge = prices[2]
     hour = prices[3]
-    lost_uav = prices[4]
     missions = prices[5]
     seconds = prices[6]
-    charged = lost = 0
+    charged = 0
+    losses = 0.0
     for i in range(record.uavs):
         charged += uavs[i].charged
-        lost += uavs[i].down
+        losses += uavs[i].down * _price_of_loss(prices, uav_prices, i)
     purchase = _purchase(prices, uav_prices, pads, record.uavs)
     charging = missions * charge * charged / 100
     hours = missions * hour * (record.slots * seconds / 3600)
-    return purchase + charging + hours + missions * lost_uav * lost
+    return purchase + charging + hours + missions * losses
 
 
 @kernel
 def _purchase(prices, uav_prices, pads, uavs):
     """What UAVs and pads cost when they are bought."""
-    uav = prices[0]
     pad = prices[1]
-    price_of_uavs = uav * uavs
-    if len(uav_prices) > 0:
-        price_of_uavs = 0.0
-        for i in range(uavs):
-            price_of_uavs += uav if np.isnan(uav_prices[i]) else uav_prices[i]
+    price_of_uavs = 0.0
+    for i in range(uavs):
+        price_of_uavs += _price_of_uav(prices, uav_prices, i)
     return price_of_uavs + pad * pads
+
+
+@kernel
+def _price_of_uav(prices, uav_prices, i):
+    """What UAV ``i`` costs: the price of its type, if it has one."""
+    if len(uav_prices) > 0 and not np.isnan(uav_prices[i]):
+        return uav_prices[i]
+    return prices[0]
+
+
+@kernel
+def _price_of_loss(prices, uav_prices, i):
+    """What the loss of UAV ``i`` costs: its own price, where there is no price of a lost UAV."""
+    lost_uav = prices[4]
+    if np.isnan(lost_uav):
+        return _price_of_uav(prices, uav_prices, i)
+    return lost_uav
 
 
 @kernel
@@ -374,13 +389,15 @@ def _bound_costs(table, bounds):
     smallest = _array3(table, _AT.ranges, _I8)[0, 0, 0]
     largest = _array3(table, _AT.ranges, _I8)[0, 0, 1]
     hour = prices[3]
-    lost_uav = prices[4]
     missions = prices[5]
     seconds = prices[6]
     uav_prices = _array1(table, _AT.uav_prices, _F8)
+    losses = 0.0
+    for i in range(largest):
+        losses += _price_of_loss(prices, uav_prices, i)
     bounds[_COST, 0] = _purchase(prices, uav_prices, mission.pads, smallest)
     hours = mission.max_slots * seconds / 3600
-    bounds[_COST, 2] = missions * (lost_uav * largest + hour * hours)
+    bounds[_COST, 2] = missions * (losses + hour * hours)
 
 
 @kernel

@@ -10,6 +10,7 @@ bytes that differ. Either way, the arrays are those that Python makes of the cha
     image.document()  # as JSON
 """
 
+import math
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -301,8 +302,15 @@ def _prices_of(space: ScenarioSpace, costs: Costs | None) -> np.ndarray:
     seconds = costs.slot_seconds or 0.0
     if space.units:
         seconds = space.units.slot
-    values = costs.model_dump() | {"seconds": seconds}
+    values = costs.model_dump() | {"seconds": seconds, "lost_uav": _price_of_loss(costs)}
     return np.array([values[name] for name in PRICES], np.float64)
+
+
+def _price_of_loss(costs: Costs) -> float:
+    """The price of a lost UAV, nan if it is what the UAV was bought for."""
+    if costs.lost_uav is not None:
+        return costs.lost_uav
+    return math.nan if costs.pays_for_losses else 0.0
 
 
 def _prices_of_types(space: ScenarioSpace, fleet: int) -> np.ndarray:

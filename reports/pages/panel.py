@@ -521,7 +521,10 @@ def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
     """The prices that a reader may change, in the order in which the module has them."""
     if costs is not None:
         for name in PRICES[: PRICES.index("seconds")]:
-            yield {"name": name, "label": _PRICED[name], "value": getattr(costs, name)}
+            value = getattr(costs, name)
+            if name == "lost_uav" and value is None and not costs.pays_for_losses:
+                value = 0.0
+            yield {"name": name, "label": _PRICED[name], "value": value}
 
 
 def _other_prices(costs: Costs | None) -> Iterator[str]:

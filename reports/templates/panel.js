@@ -21,7 +21,10 @@ const inputs = Object.fromEntries(SIDES.map((side) => [side, {
 }]));
 const missions = named("missions");
 const priceInputs = data.prices.map(({name}) => named(`price-${name}`));
-const prices = () => priceInputs.map((input) => Math.min(Math.max(Number(input.value) || 0, 0), 1e12));
+// An empty price of a lost UAV is what the UAV was bought for, where the page has that.
+const isAsBought = (/** @type {any} */ input) => input.value === "" && input.placeholder !== "";
+const prices = () => priceInputs.map((input) =>
+    isAsBought(input) ? NaN : Math.min(Math.max(Number(input.value) || 0, 0), 1e12));
 const required = [...root.querySelectorAll("[data-panel=requirement]")].map((line, n) =>
     ({line, metric: named(`require-${n}`), bound: named(`bound-${n}`), slider: named(`slide-${n}`)}));
 
@@ -114,7 +117,7 @@ function check(first, records) {
 
 function tidy() {
     missions.value = asked();
-    priceInputs.forEach((input, n) => { input.value = prices()[n]; });
+    priceInputs.forEach((input, n) => { if (!isAsBought(input)) input.value = prices()[n]; });
 }
 
 function start() {
@@ -202,7 +205,7 @@ function sweepCommand() {
     return ["dess sweep", `--policy ${quoted(a.policy)}`, ...data.fixed.map((setting) => `--set ${quoted(setting)}`),
         ...optionsOf(data, a, "--set", isLeftOut), ...axes,
         ...required.map(({metric, bound}) => `--require ${quoted(`${metric.option}=${bound}${metric.suffix}`)}`),
-        ...data.prices.map(({name}, n) => `--price ${quoted(`${name}=${prices()[n]}`)}`),
+        ...data.prices.flatMap(({name}, n) => isAsBought(priceInputs[n]) ? [] : [`--price ${quoted(`${name}=${prices()[n]}`)}`]),
         ...data.priced.map((price) => `--price ${quoted(price)}`),
         `--scenario ${quoted(data.scenario)}`, `--seed ${data.seed}`].join(" ");
 }
@@ -447,7 +450,7 @@ function addressOf() {
         data.settings.forEach(({key}, n) => state.set(`${side}-${key}`, String(positions[n])));
         state.set(`${side}-policy`, policy);
     }
-    data.prices.forEach(({name}, n) => state.set(`price-${name}`, String(prices()[n])));
+    data.prices.forEach(({name}, n) => { if (!isAsBought(priceInputs[n])) state.set(`price-${name}`, String(prices()[n])); });
     required.forEach(({metric, bound}, n) => {
         state.set(`require-${n}`, metric.value);
         if (metric.value) state.set(`bound-${n}`, bound.value);

@@ -37,14 +37,13 @@ from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import unknown_name
 
 CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
-# What the parts of a cost are called, and the price that makes each.
+# What the parts of a cost are called.
 _PART_NAMES = {
     "packs": "battery packs",
     "charging": "charging",
     "hours": "hours",
     "losses": "lost UAVs",
 }
-_PRICE_OF_PART = {"packs": "pack", "charging": "charge", "hours": "hour", "losses": "lost_uav"}
 _PER_GB = "cost_per_gb"  # of a year, with a data sheet
 _MB_PER_GB = 1000
 
@@ -203,7 +202,7 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
     running = [
         f"{name} {money(means[part])}"
         for part, name in _PART_NAMES.items()
-        if getattr(prices, _PRICE_OF_PART[part])
+        if part in prices.paid_parts
     ]
     total = money(means.sum() - means[PURCHASE])
     return (

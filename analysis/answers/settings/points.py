@@ -96,7 +96,7 @@ def fleets_in_words(results: Results) -> list[str]:
     for point, others in enumerate(_fields_in_words(results, True)):
         space = results.scenario(point)
         words = []
-        has_price = prices.uav or prices.lost_uav or has_priced_types(space)
+        has_price = prices.uav or prices.pays_for_losses or has_priced_types(space)
         if has_price or "uavs" in table:
             words.append(field_named("uavs").words(single_value([*space.uavs])))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:

@@ -60,7 +60,26 @@ def test_the_cost_of_a_year_by_hand():
     assert parts["charging"] == pytest.approx([250 * 2 * 0.9, 250 * 2 * 1.8])
     assert parts["hours"] == pytest.approx([250 * 60 * 3, 250 * 60 * 1])
     assert parts["losses"].tolist() == [0, 250 * 50 * 2]
-    assert prices.of_lost(2) == 250 * 50 * 2
+    assert prices.loss_of_fleets(spaces[0]) == 250 * 50 * 2
+
+
+def test_a_lost_uav_costs_what_it_was_bought_for_where_missions_are_paid_for():
+    """UAV 1, of a type with a price, is lost."""
+    spaces = [space(uavs=2, fleet=[{}, {"price": 300.0}])]
+    missions = {"point": [0], "uavs": [2], "slots": [90], "flying_time": [80]}
+    uavs = {"charged": [0, 0], "down": [0, 1], "battery": [33, 0]}
+
+    def losses(**prices: Any) -> float:
+        return float(Costs(uav=100, **prices).parts(spaces, missions, uavs)["losses"][0])
+
+    assert losses() == 0  # only the purchase is paid for
+    assert losses(years=5, days=200) == 200 * 300
+    assert losses(missions=7) == 7 * 300
+    assert losses(charge=1) == losses(hour=1, slot_seconds=60) == 300
+    assert losses(years=5, days=200, lost_uav=0) == 0
+    assert losses(years=5, days=200, lost_uav=50) == 200 * 50
+    assert "A lost UAV costs what it was bought for." in Costs(uav=1, years=5, days=9).in_words
+    assert "a lost UAV" in Costs(uav=1).in_words
 
 
 def test_the_price_of_a_type_replaces_that_of_a_uav():
@@ -69,7 +88,7 @@ def test_the_price_of_a_type_replaces_that_of_a_uav():
     spaces = [space(uavs=[1, 3], fleet=types), space(uavs=3, pads=1)]
     missions = {"point": [0, 0, 1], "uavs": [3, 1, 3], "slots": [9] * 3, "flying_time": [80] * 3}
     prices = Costs(uav=100, pad=10, years=2, days=1)
-    parts = prices.parts(spaces, missions, {})
+    parts = prices.parts(spaces, missions, {"down": [0] * 7})
     pads = 10 * spaces[0].charging_pads
     assert parts["purchase"].tolist() == [(700 + pads) / 2, (300 + pads) / 2, (300 + 10) / 2]
     assert prices.words_on(spaces).startswith("Prices: 300 EUR for a UAV of type 1, 100 EUR for a")
