@@ -446,7 +446,9 @@ def _out_of_range(c: Constants) -> Iterator[InputError]:
                 setting = low
             reason = ""
             if name == "uavs":
-                reason = f" (cells of the zone, at most {MOST_UAVS})"
+                reason = ", one for each cell of the start zone; a wider zone has room for more"
+                if most == MOST_UAVS:
+                    reason = ""
             yield InputError(name, f"{setting} is out of range", f"{least}..{most}{reason}")
     start = ends["charge_start"][1]
     complete = ends["charge_complete"][0]

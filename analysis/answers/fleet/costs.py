@@ -46,6 +46,7 @@ _PART_NAMES = {
 }
 _PER_GB = "cost_per_gb"  # of a year, with a data sheet
 _MB_PER_GB = 1000
+_MOST_PER_UNIT = 1000  # above it, the cost of a smaller unit of data is told
 
 
 @compute_once
@@ -213,7 +214,7 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
 
 
 def _cost_per_gb_in_words(results: Results, rows: pd.DataFrame) -> str:
-    """What a GB costs, to follow the cost of a year; empty where that is not known.
+    """What a GB, MB or kB costs, to follow the cost of a year; empty where that is not known.
 
     Args:
         results: The study.
@@ -221,8 +222,13 @@ def _cost_per_gb_in_words(results: Results, rows: pd.DataFrame) -> str:
     """
     if "gb" not in rows or not rows["gb"].sum():
         return ""
-    per_gb = rows[COST].mean() / rows["gb"].mean()
-    return f", or {numbers.format_money(per_gb, results.prices.currency)} per GB collected"
+    per_unit = rows[COST].mean() / rows["gb"].mean()
+    unit = "GB"
+    for smaller in ("MB", "kB"):
+        if per_unit >= _MOST_PER_UNIT:
+            per_unit /= 1000
+            unit = smaller
+    return f", or {numbers.format_money(per_unit, results.prices.currency)} per {unit} collected"
 
 
 def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
