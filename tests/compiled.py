@@ -5,7 +5,7 @@ import numpy as np
 from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import empty_scratch
-from dess.model.guard import battery, moves, parking, queues, ways
+from dess.model.guard import battery, matching, moves, parking, queues, ways
 from dess.model.state import SENSOR, STEP_X, STEP_Y
 from dess.model.ways_home import reach_of
 from dess.physics.chart import FAR, distance, is_open
@@ -91,6 +91,19 @@ def plan_of_pads(mission, uavs, i, chart, data=1e6):
 @kernel
 def _plan_pads(mission, uavs, i, data, chart, plan, reach):
     return queues.plan_pads(mission, uavs, i, data, chart, plan, reach)
+
+
+def spread_out(prices, zones, cells):
+    """The zones of UAVs that were in the best zone for each, as the matching changes them."""
+    turns = np.zeros(len(zones), queues.TURN)
+    turns["zone"] = zones
+    _spread_out(prices, turns, cells - np.bincount(zones, minlength=len(cells)))
+    return turns["zone"]
+
+
+@kernel
+def _spread_out(prices, turns, left):
+    matching.spread_out(prices, turns, left)
 
 
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):

@@ -1,6 +1,7 @@
 """Hardly any guarded UAV is lost."""
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 
 from dess import load_scenario
 from dess.model.batch import simulate_batch
-from dess.model.state import BATTERY, END_NAMES
+from dess.model.state import BATTERY, END_NAMES, TRUNCATED
+from dess.physics.chart import OPEN
 from dess.policies.registry import load
 from dess.scenario.families import FAMILIES
 from dess.scenario.scenario import ScenarioSpace
@@ -67,3 +69,61 @@ def failures(seed: int) -> tuple[int, list[str]]:
 def test_at_most_one_of_a_thousand_drawn_missions_fails():
     missions, failed = failures(SEED)
     assert len(failed) <= missions / 1000, "\n".join(failed)
+
+
+# --- further zones with few cells ---
+
+# Scenarios whose second zone is replaced by a small one, and how large this is by its cells.
+TIGHT: dict[str, tuple[str, dict[str, Any]]] = {
+    "in the air": ("paper", {}),
+    "quota": ("paper", {"landing": True}),
+    "no quota": ("paper", {"landing": True, "quota": 0, "max_slots": 250}),
+    "sheet": ("jade-bight", {"data_sheet": {"horizon": "90 min"}}),
+    "LoRa": ("jade-lora", {"data_sheet": {"horizon": "90 min"}}),
+}
+SIZES = {1: (1, 1), 2: (2, 1), 3: (1, 3), 4: (2, 2)}
+# Missions of each kind, size of zone and fleet; the whole grid has 3,000 and takes hours.
+TIGHT_MISSIONS = 60
+
+
+def tight_space(kind: str, cells: int, uavs: int, draws: np.random.Generator) -> ScenarioSpace:
+    """A scenario with a small further zone anywhere on open water.
+
+    The start zone has a pad for two UAVs that the further zone has no cells for, or one more.
+    """
+    name, fields = TIGHT[kind]
+    sea = load_scenario(name)
+    rows, columns = sea.chart.zones.shape
+    width, height = SIZES[cells]
+    while True:
+        x = int(draws.integers(columns - width + 1))
+        y = int(draws.integers(rows - height + 1))
+        if (sea.chart.zones[y : y + height, x : x + width] == OPEN).all():
+            break
+    pads = max((uavs - min(2, cells) + 1) // 2, 1) + int(draws.integers(2))
+    small = {"cells": [x, y, width, height], "pads": 1}
+    return load_scenario(name, **fields, zone=sea.zone, uavs=uavs, pads=pads, zones=[small])
+
+
+def lost_of(policy: str, kind: str, cells: int, uavs: int, missions: int) -> list[int]:
+    """The drawn missions in which a UAV is lost, or not on the ground at the end of all work."""
+    draws = np.random.default_rng([list(TIGHT).index(kind), cells, uavs])
+    seas = [tight_space(kind, cells, uavs, draws) for _ in range(max(missions // 10, 1))]
+    spaces = [seas[number % len(seas)] for number in range(missions)]
+    ends = simulate_batch(spaces, load(policy), SEED, missions).uavs["end"][:, :uavs]
+    is_out = (ends == BATTERY) | ((ends == TRUNCATED) & (seas[0].quota == 0))
+    return np.flatnonzero(is_out.any(axis=1)).tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", TIGHT)
+@pytest.mark.parametrize("policy", ["greedy", "any"])
+def test_at_most_one_of_a_thousand_missions_loses_a_uav_where_a_zone_has_few_cells(policy, kind):
+    missions = TIGHT_MISSIONS if policy == "greedy" else TIGHT_MISSIONS // 10
+    lost = {
+        (cells, uavs): found
+        for cells, uavs in product(SIZES, range(2, 7))
+        if (found := lost_of(policy, kind, cells, uavs, missions))
+    }
+    simulated = missions * len(SIZES) * 5
+    assert sum(map(len, lost.values())) <= simulated / 1000, lost

@@ -41,8 +41,9 @@ from dess.scenario.fields import MOST_ZONES
 LACKING, SPARE = 64, 4
 # The slots that a UAV keeps for delays of those who are charged before it.
 KEPT = 2
-# The slots in which a UAV leaves its cell of a full zone, and the next one takes it.
-CHANGE = 2
+# The price of a UAV without a cell in a zone, which waits outside for its turn, and the slots in
+# which a UAV leaves its cell and the next one takes it.
+OUTSIDE, CHANGE = 32, 2
 
 # The orders in which a zone may charge the UAVs that come to it: as they ask; of those that wait,
 # the one with the earliest deadline; by their deadlines, though a pad is idle until one comes.
@@ -294,7 +295,7 @@ def _price(mission, uavs, chart, zone, plan):
             price = _serve(mission, uavs, zone, order, plan)
             if price < least:
                 least, plan.queues[zone].order = price, order
-    return least
+    return least + OUTSIDE * max(count - chart.sizes[zone], 0)
 
 
 @shared_kernel

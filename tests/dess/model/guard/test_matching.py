@@ -1,0 +1,99 @@
+"""Zones with fewer cells than UAVs: no two UAVs count on the same cell."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+
+from dess import load_scenario, policies
+from dess.model.batch import simulate_batch
+from dess.model.guard.queues import CHANGE
+from dess.model.state import END_NAMES, HOVER
+from tests import compiled
+from tests.dess.envs.episodes import placed
+from tests.dess.model.guard.test_guard import _mask
+
+# A strip of three rows with a zone of a cell for each UAV at its western end, and one of a single
+# cell at its eastern end. Missions end on the ground, and there are no margins but for teammates.
+STRIP: dict[str, Any] = {"grid": 24, "rows": 3, "zone": [0, 0, 1, 3], "nodes": [[12, 0]]}
+STRIP |= {"zones": [{"cells": [23, 1, 1, 1], "pads": 1}], "charge_start": 10}
+LANDING = STRIP | {"landing": True}
+
+
+def _homes(uavs: list[dict[str, Any]], **scenario: Any) -> list[tuple[int, int]]:
+    """The x and the way of the cell that each UAV counts on."""
+    state, chart = placed(uavs, **scenario)
+    mission, team = state.missions[0], state.uavs[0]
+    homes = [compiled.parking_cell(mission, team, i, chart) for i in range(len(uavs))]
+    return [(home.x, home.cells) for home in homes]
+
+
+def test_a_uav_that_reaches_two_zones_leaves_the_last_cell_to_one_that_reaches_one():
+    """It has less battery, so it would choose first, and it is nearer to the small zone."""
+    both, one = {"x": 12, "y": 1, "battery": 13}, {"x": 18, "y": 1, "battery": 14}
+    assert _homes([both, one], **LANDING) == [(0, 12), (23, 5)]
+    assert _homes([one, both], **LANDING) == [(23, 5), (0, 12)]
+
+
+def test_who_stands_in_the_cell_of_another_leaves_it():
+    """It is charged and reaches the other zone; a UAV that charges stays."""
+    standing, other = {"x": 23, "y": 1, "battery": 60}, {"x": 20, "y": 1, "battery": 12}
+    assert _homes([standing, other], **LANDING) == [(0, 23), (23, 3)]
+    assert not _mask(standing, other, **LANDING)[0, HOVER]
+    charging = standing | {"charging": True, "pad_request": 3}
+    assert _homes([charging, other], **LANDING)[0] == (23, 0)
+
+
+def test_who_comes_first_takes_the_cell_behind_those_of_others():
+    """The zone of two cells is at the end of a corridor, so the front one closes the way."""
+    corridor = [[x, y] for x in range(4, 20) for y in (0, 2)]
+    sea = LANDING | {"grid": 20, "zones": [{"cells": [18, 1, 2, 1], "pads": 1}], "no_fly": corridor}
+    sea["nodes"] = [[12, 1]]
+    uavs = [{"x": x, "y": 1, "battery": 14} for x in (14, 16, 1)]
+    assert _homes(uavs, **sea) == [(18, 4), (19, 3), (0, 1)]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_other_matching_has_a_lower_price(seed):
+    draws = np.random.default_rng(seed)
+    cells = draws.integers(1, 4, draws.integers(2, 6))
+    uavs = int(draws.integers(1, cells.sum() + 1))
+    prices = draws.integers(0, 50, (uavs, len(cells)))
+    zones = compiled.spread_out(prices, prices.argmin(1), cells)
+    assert (np.bincount(zones, minlength=len(cells)) <= cells).all()
+    by_cell = np.repeat(prices, cells, axis=1)
+    least = by_cell[linear_sum_assignment(by_cell)].sum()
+    assert prices[np.arange(uavs), zones].sum() == least
+
+
+def test_where_missions_go_on_in_the_air_uavs_take_turns_in_a_cell():
+    """The first UAV charges from 20 to 80 % in 6 slots; then the other one takes its cell."""
+    waiting = {"latch": True, "pad_request": -1, "executed": HOVER}
+    team = [{"x": x, "y": 1, "battery": b} | waiting for x, b in ((22, 21), (20, 19))]
+    sea = STRIP | {"charge_start": 30, "charge_complete": 80, "pads": 1}
+    state, chart = placed(team, **sea)
+    plan, _ = compiled.plan_of_pads(state.missions[0], state.uavs[0], 0, chart)
+    assert plan.turns["zone"].tolist() == [1, 1]
+    assert plan.turns["begins"].tolist() == [1, 1 + 6 + CHANGE]
+    assert _homes(team, **sea) == [(23, 1), (23, 3)]
+
+
+# Seas of families whose second zone has four cells, for five UAVs. Each had a UAV that was lost or
+# was not on the ground at the end.
+TIGHT: dict[str, Any] = {"uavs": 5, "landing": True, "quota": 0}
+
+
+@pytest.mark.parametrize(
+    ("sea", "changes", "seed", "missions"),
+    [
+        ("archipelago:1040929", {"pads": 2, "max_slots": 201}, 1083329, range(24)),
+        ("corridor:995720", {"pads": 1, "max_slots": 280}, 1038120, [17]),
+        ("corridor:930954", {"pads": 2, "max_slots": 258}, 957454, [8, 9, 23]),
+    ],
+)
+def test_all_uavs_land_on_tight_seas(sea, changes, seed, missions):
+    zones = [{"cells": zone.cells, "pads": 1} for zone in load_scenario(sea).zones]
+    space = load_scenario(sea, **TIGHT, **changes, zones=zones)
+    ends = simulate_batch(space, policies.load("greedy"), seed, missions).uavs["end"]
+    assert (ends == END_NAMES.index("landed")).all()
