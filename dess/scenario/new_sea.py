@@ -65,11 +65,11 @@ class NewScenario:
                 an SNR, is asked for the rest of the budget in place of the SNR.
         """
         link: tuple[str, ...] = ("snr",)
-        optional = _ASKED
+        optional = [*_ASKED]
         has_budget = bool(answered.keys() & {*LINK_BUDGET, "free_space"})
         if has_budget or (answered.get("modulation") == LORA and "snr" not in answered):
             link = LINK_BUDGET
-            optional = ("free_space", *_ASKED)
+            optional = ["free_space", *_ASKED]
         needed = [*_NEEDED, *link]
         needed += [name for field, name in _NEEDED_WITH.items() if field in answered]
         if self.nodes.has_amounts(RATES):

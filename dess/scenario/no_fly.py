@@ -366,11 +366,9 @@ def _limits(place: Place, kind: re.Pattern[str]) -> list[float]:
             continue
         text = str(value).strip()
         if not text[-1:].isalpha() and not _FLIGHT_LEVEL.fullmatch(text):
-            units = [
-                str(unit).lower()
-                for other, unit in statements.items()
-                if other.rpartition(".")[0] == table and _UNIT.search(other)
-            ]
+            beside = [n for n in statements if n.rpartition(".")[0] == table and _UNIT.search(n)]
+            beside.sort(key=lambda other: not kind.search(other))  # its own unit, if it has one
+            units = [str(statements[other]).lower() for other in beside]
             text = f"{text} {next(filter(str.isalpha, units), 'm')}"
         level = _FLIGHT_LEVEL.fullmatch(text)
         if level:

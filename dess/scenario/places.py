@@ -333,16 +333,16 @@ def read_geojson(path: Path) -> Places:
     for number, feature in enumerate(features):
         where = f"features.{number}"
         properties = {"id": feature.id} | _foreign(feature) | (feature.properties or {})
-        place = Place(where, properties, [])
+        of_feature = Place(where, properties, [])
         if feature.geometry:
-            place.properties.update(_foreign(feature.geometry))
+            of_feature = Place(where, properties | _foreign(feature.geometry), [])
             for inner, geometry in _geometries(feature.geometry, f"{where}.geometry"):
                 shapes = _shapes(geometry, f"{path}: {inner}")
                 if geometry is not feature.geometry and _foreign(geometry):
                     places.append(Place(inner, properties | _foreign(geometry), [*shapes]))
                 else:
-                    place.shapes.extend(shapes)
-        places.append(place)
+                    of_feature.shapes.extend(shapes)
+        places.append(of_feature)
     return Places(True, places)
 
 

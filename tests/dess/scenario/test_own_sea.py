@@ -222,6 +222,7 @@ def test_zones_of_ed_318_are_read_with_their_extent_and_layer(sea, tmp_path, cap
         ({"lowerLimit": {"value": 1000, "unit": 1, "referenceDatum": 1}}, True),
         ({"lower_limit_height": 30, "lower_limit_unit": "FT", "lower_limit_ref": "AGL"}, False),
         ({"lower_limit_height": 40, "lower_limit_unit": "FT"}, True),
+        ({"upper": 5, "upper_unit": "FL", "lower": 30, "lower_unit": "FT"}, False),
         ({"floor": 1, "floor_unit": "FL"}, True),
         ({"upper": 5, "uom": "m"}, True),
     ],
