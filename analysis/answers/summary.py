@@ -583,7 +583,8 @@ def selected_settings(results: Results) -> pd.DataFrame:
         study selects nothing. For a study that selects the cheapest setting, the rows of
         ``FleetSearch.selected_fleets``.
     """
-    if isinstance(results.study.selection, Cheapest):
+    rule = results.study.selection
+    if isinstance(rule, Cheapest):
         return search_of(results).selected_fleets()
     words = points_in_words(results)
     rows = []
@@ -595,9 +596,9 @@ def selected_settings(results: Results) -> pd.DataFrame:
             rows.append((*selected, c.guaranteed, guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     table = pd.DataFrame(rows, columns=columns)
-    if table.empty:
+    if rule is None:
         return table
-    metric = ranking_column(results.study.selection.metric, results.missions)
+    metric = ranking_column(rule.metric, results.missions)
     means = means_of_points(results)
     ends = means.loc[means["metric"] == metric, ["policy", "point", "metric", *_ENDS]]
     return table.merge(ends, on=["policy", "point"], how="left")

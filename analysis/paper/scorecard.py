@@ -113,9 +113,15 @@ def _read_claim(
         number = _printed_quantity(**printed)
         if number.n:
             metric = printed["figure"].rpartition(".")[2]
-    place = {name: section[name] for name in ("page", "study")}
-    known = {"measure": measured, "printed": number, "printed_metric": metric}
-    return Claim(rule=RULES[rule], **known, **place, **others)
+    return Claim(
+        page=section["page"],
+        study=section["study"],
+        rule=RULES[rule],
+        measure=measured,
+        printed=number,
+        printed_metric=metric,
+        **others,
+    )
 
 
 def _printed_quantity(

@@ -88,8 +88,8 @@ def compare_crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
             spread = float(d.std(ddof=1))
         return Crossed(*of_missions, np.nan, np.nan, p, p, np.nan, spread, np.nan)
     if np.ptp(d) == 0:
-        both = 2 * [sign_test(d[:, 0])]
-        return Crossed(*of_missions, mean, mean, *both, 0.0, 0.0, 0.0)
+        sign = sign_test(d[:, 0])
+        return Crossed(*of_missions, mean, mean, sign, sign, 0.0, 0.0, 0.0)
     row = d.mean(axis=1, keepdims=True)
     column = d.mean(axis=0, keepdims=True)
     rest = float(np.sum((d - row - column + mean) ** 2)) / (trainings - 1) / (missions - 1)

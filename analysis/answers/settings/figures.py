@@ -179,8 +179,9 @@ def draw_heat_map(
                 line = ":" if standing == SEEN_WORSE else "-"
                 for row in framed.itertuples():
                     corner = row.column + 0.06, row.row + 0.06
-                    frame = {"fill": False, "edgecolor": MARK, "linestyle": line}
-                    ax.add_patch(Rectangle(corner, 0.88, 0.88, **frame))
+                    frame = Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK)
+                    frame.set_linestyle(line)
+                    ax.add_patch(frame)
             if best in part.index:
                 place = rows.loc[best, "column"] + 0.5, rows.loc[best, "row"] + 0.8
                 ax.plot(*place, "*", color=MARK, markersize=9, markeredgecolor="white")
