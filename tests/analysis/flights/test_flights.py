@@ -170,6 +170,16 @@ def test_a_mission_for_which_there_are_no_times_of_day_is_refused(tmp_path, monk
         flight_plan.check_plannable(scenario)
 
 
+def test_a_grid_that_reaches_beyond_a_pole_is_refused():
+    """In cells of 95 km, with all that is flown to about the middle."""
+    sheet = {"endurance": "10 d", "cruise": "11 m/s", "charging": "10 d", "data_rate": "1 kB/h"}
+    sheet |= {"bandwidth": "1 MHz", "snr": "20 dB at 100 m", "horizon": "20 d"}
+    world = {"grid": 128, "centre": (0, 50), "nodes": [(64, 64)], "zone": (63, 64, 1, 1)}
+    scenario = Scenario.of(uavs=1, pads=1, data_sheet=sheet, **world)
+    with pytest.raises(InputError, match="--plan: the grid reaches beyond a pole"):
+        flight_plan.check_plannable(scenario)
+
+
 # --- where way points are ---
 
 

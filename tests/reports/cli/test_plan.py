@@ -72,8 +72,6 @@ def test_a_plan_is_written_completely_or_not_at_all(dess, refusal, tmp_path, sea
 # What is replaced in the file of the sea by what, the options, and what the line says.
 PLACES = FIELDS.removeprefix("uavs = 1\n")
 IN_CELLS = "grid = 8\nnodes = [[2, 1]]\n"
-# The node is south of the zone, where distances are right.
-AT_A_POLE = "grid = 8\nnodes = [[0, 6]]\ncentre = [0, 89.998]\n"
 REFUSED = {
     "no degrees": (PLACES, IN_CELLS, (), "--plan: the sea has no degrees"),
     "no sheet": (SHEET, "", (), "--plan: the scenario has no cruise and no slot in seconds"),
@@ -81,7 +79,6 @@ REFUSED = {
         *("uavs = 1\n", "uavs = 1\nlanding = false\nquota = 9\n", ()),
         "--plan: the UAVs do not land",
     ),
-    "a pole": (PLACES, AT_A_POLE, (), "--plan: the grid reaches beyond a pole"),
     "no time": ("", "", ("--start", "soon"), "--start: 'soon' is no time"),
     "no such time": ("", "", ("--start", "2900-01-01"), "--start: '2900-01-01' is out of range"),
 }
