@@ -113,7 +113,8 @@ def _simplify(
             within = [piece for piece in pieces if part.contains(shapely.Polygon(piece))]
             islands += [_Outline(piece, corridor) for piece in within]
         else:
-            islands.append(_Outline([*filled.exterior.coords][:-1], corridor))
+            corners = [(x, y) for x, y in filled.exterior.coords][:-1]
+            islands.append(_Outline(corners, corridor))
     islands.sort(key=lambda island: island.distance_to(ways))
     kept: list[_Outline] = []
     left_out = None
@@ -134,15 +135,13 @@ class _Outline:
         """Simplify an outline as far as it does not enter a corridor."""
         import shapely
 
-        ring = shapely.Polygon(corners)
-        self.polygon = ring
-        self._steps = [(0.0, [*map(tuple, corners)])]
-        ring = np.array(shapely.get_coordinates(shapely.normalize(ring).exterior))[:-1]
-        if not shapely.LinearRing(ring).is_ccw:
-            ring = ring[::-1]
+        self._polygon = shapely.Polygon(corners)
+        self._steps: list[tuple[float, Corners]] = [(0.0, corners)]
+        exterior = shapely.geometry.polygon.orient(self._polygon).exterior  # counterclockwise
+        ring = np.array(exterior.coords)[:-1]
         while len(ring) > 3 and (step := _without_a_corner(ring, corridor)):
             area, ring = step
-            self._steps.append((area, [*map(tuple, ring.tolist())]))
+            self._steps.append((area, [(x, y) for x, y in ring.tolist()]))
         self._number = 0
 
     @property
@@ -168,7 +167,7 @@ class _Outline:
 
     def distance_to(self, ways: Any) -> float:
         """How far the piece is from ways [cells]."""
-        return float(self.polygon.distance(ways))
+        return float(self._polygon.distance(ways))
 
 
 def _without_a_corner(ring: np.ndarray, corridor: Any) -> tuple[float, np.ndarray] | None:

@@ -394,12 +394,12 @@ def _line(value: Any, place: str) -> np.ndarray:
     return line
 
 
-def _positions(value: Any, place: str) -> np.ndarray:
-    """The (K, 2) degrees of a list of positions."""
+def _positions(value: Any, place: str, form: str = "[lon, lat]") -> np.ndarray:
+    """The (K, 2) degrees of a list of positions; messages say their ``form``."""
     try:
         positions = np.array([position[:2] for position in value], float).reshape(len(value), 2)
     except (TypeError, ValueError, OverflowError, KeyError):
-        raise InputError(place, "has not two numbers", "[lon, lat]") from None
+        raise InputError(place, "has not two numbers", form) from None
     most = np.array(LIMITS[GEOGRAPHIC])
     for number, axis in np.argwhere(~(np.abs(positions) <= most + _ROUNDING)):
         where = place
@@ -474,7 +474,7 @@ def _corners(value: Any, place: str) -> np.ndarray:
     """(K, 2) longitudes and latitudes of a list of [lat, lon]."""
     if isinstance(value, list):
         value = [[*reversed(c[:2])] if isinstance(c, list) else c for c in value]
-    return _positions(value, place)
+    return _positions(value, place, "[lat, lon]")
 
 
 def _ring_about(centre: np.ndarray, radius: float) -> np.ndarray:

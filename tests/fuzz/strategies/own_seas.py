@@ -66,17 +66,34 @@ def _documents(draw: st.DrawFn) -> str:
 
 
 @st.composite
+def _fences(draw: st.DrawFn) -> str:
+    """A plan with polygons and circles in which UAVs stay, or which they do not enter."""
+    corner = st.lists(st.sampled_from([8.2, 8.21, 8.25, 8.28, 90, 200, "8"]), max_size=3)
+    polygon = st.fixed_dictionaries(
+        {"polygon": st.lists(corner, max_size=4), "inclusion": st.booleans()}
+    )
+    radius = st.sampled_from([100, 0, 1e9, -1, "100"])
+    circle = st.fixed_dictionaries({"center": corner, "radius": radius})
+    circles = st.fixed_dictionaries({"circle": circle, "inclusion": st.booleans()})
+    lists = {"polygons": st.lists(polygon, max_size=2), "circles": st.lists(circles, max_size=2)}
+    fence = draw(st.fixed_dictionaries({}, optional=lists))
+    return json.dumps({"fileType": "Plan", "geoFence": fence})
+
+
+@st.composite
 def own_seas(draw: st.DrawFn) -> Case:
     """A scenario with drawn files, or with a quantity that is set without quotes of its own."""
     head = 'nodes = "own.csv"\nuavs = 1\ngrid = 64\nzone = [30, 30, 2, 2]\n'
-    if draw(st.booleans()):
-        head += 'no_fly = "own.geojson"\n'
+    no_fly = draw(st.sampled_from(["", "own.geojson", "own.geojson", "own.plan"]))
+    if no_fly:
+        head += f'no_fly = "{no_fly}"\n'
     if draw(st.booleans()):
         head += "[data_sheet]\n" + "\n".join(f'{name} = "{of}"' for name, of in _SHEET.items())
     steps = (
         write("in/own.toml", head.encode()),
         write("in/own.csv", draw(_tables()).encode("utf-8", "surrogatepass")),
         write("in/own.geojson", draw(_documents()).encode("utf-8", "surrogatepass")),
+        write("in/own.plan", draw(_fences()).encode()),
     )
     # A sweep loads the scenario several times, and may tell of a file before it refuses a value.
     words, values = _COMMANDS[0] if "no_fly" in head else draw(st.sampled_from(_COMMANDS))

@@ -72,19 +72,12 @@ def test_a_plan_is_written_completely_or_not_at_all(dess, refusal, tmp_path, sea
 # What is replaced in the file of the sea by what, the options, and what the line says.
 PLACES = FIELDS.removeprefix("uavs = 1\n")
 IN_CELLS = "grid = 8\nnodes = [[2, 1]]\n"
-AT_A_POLE = f"{IN_CELLS}centre = [0, 90]\n"
 REFUSED = {
     "no degrees": (PLACES, IN_CELLS, (), "--plan: the sea has no degrees"),
     "no sheet": (SHEET, "", (), "--plan: the scenario has no cruise and no slot in seconds"),
     "no landing": (
         *("uavs = 1\n", "uavs = 1\nlanding = false\nquota = 9\n", ()),
         "--plan: the UAVs do not land",
-    ),
-    "a pole": (
-        PLACES,
-        f"{IN_CELLS}centre = [0, 90]\n",
-        (),
-        "--plan: the grid reaches beyond a pole",
     ),
     "no time": ("", "", ("--start", "soon"), "--start: 'soon' is no time"),
     "no such time": ("", "", ("--start", "2900-01-01"), "--start: '2900-01-01' is out of range"),
