@@ -70,7 +70,10 @@ FAILING = {"failures.pad_rate": 0.1}
 # Fields of the paper's scenario, and what the message says of the last of them, and allows.
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
     *(({"uavs": value}, "", "") for value in (2.0, True, "2", [1, 2, 3])),
-    *(({"uavs": value}, "", "1..16, one for each cell of the start zone") for value in (0, 17, [3, 1])),
+    *(
+        ({"uavs": value}, "", "1..16, one for each cell of the start zone")
+        for value in (0, 17, [3, 1])
+    ),
     ({"edge_snr": float("nan")}, "out of range", ""),
     ({"nodes": [[0, 0], [32, 0]]}, "[32, 0] is off the grid", "0 <= x, y < 32"),
     ({"nodes": [[4, 5], [6, 7], [4, 5]]}, "[4, 5] is listed twice", "distinct"),
