@@ -306,8 +306,8 @@ _PER_UAV = "collected_per_uav"
 # What a mission collects and leaves, by the metrics that are a part of both together.
 _DATA_KEPT = {column: (COLLECTED, "residual") for column in (COLLECTED, "residual", _PER_UAV)}
 _DATA_KEPT |= {
-    _IN_SHEET_UNIT[column]: tuple(_IN_SHEET_UNIT[part] for part in parts)
-    for column, parts in _DATA_KEPT.items()
+    _IN_SHEET_UNIT[column]: (_IN_SHEET_UNIT[COLLECTED], _IN_SHEET_UNIT["residual"])
+    for column in _DATA_KEPT
 }
 # The columns of the values of all nodes of a mission, of which a metric has those of the worst one.
 NODE_RATIOS, NODE_AGES = "node_ratios", "node_ages"

@@ -186,7 +186,7 @@ def _darken_until_readable(colour: tuple[float, ...]) -> tuple[float, ...]:
     return _darken_until_readable(darker)
 
 
-def _contrast_with_white(colour: Sequence[float]) -> float:
+def _contrast_with_white(colour: Sequence[float] | np.ndarray) -> float:
     """The contrast of a colour with white, from 1 to 21 (WCAG 2.1, 1.4.3)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour[:3]]
     luminance = float(np.dot([0.2126, 0.7152, 0.0722], linear))

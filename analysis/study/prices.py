@@ -278,9 +278,11 @@ class Costs(StrictTable):
         points = np.asarray(missions["point"])
         slots = np.array([space.max_slots for space in spaces])
         hours = slots * [self.seconds_per_slot(space) / 3600 for space in spaces]
-        spent = slots * [most_battery_per_slot(space) / 100 for space in spaces]
+        spent = slots * [most_battery_per_slot(space) for space in spaces]
+        smallest_packs = [min(_full_packs_of(space, space.uavs[1])) for space in spaces]
+        packs = spent / smallest_packs / self.pack_cycles
         lost = np.array([max(self.prices_of_lost_uavs(space, space.uavs[1])) for space in spaces])
-        of_uav = lost + (self.charge + self.pack / self.pack_cycles) * spent
+        of_uav = lost + self.charge * spent / 100 + self.pack * packs
         of_fleet = of_uav[points] * np.asarray(missions["uavs"])
         return self.paid_missions * (of_fleet + self.hour * hours[points])
 
@@ -427,12 +429,16 @@ def types_of_uavs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) 
 def _full_packs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) -> np.ndarray:
     """(u,) the full battery of each UAV, its reserve included [%]."""
     most = max(space.uavs[1] for space in spaces)
-    packs = np.full((len(spaces), most), 100.0)
-    for point, space in enumerate(spaces):
-        if space.units:
-            kinds = [type_of(space.fleet, uav) for uav in range(most)]
-            packs[point] = [100 * float(space.data_sheet.share_of_type(kind)) for kind in kinds]
+    packs = np.array([_full_packs_of(space, most) for space in spaces])
     return packs[_places_of_uavs(missions)]
+
+
+def _full_packs_of(space: ScenarioSpace, uavs: int) -> list[float]:
+    """The full battery of each of the first UAVs of a scenario, its reserve included [%]."""
+    if not space.units:
+        return [100.0] * uavs
+    kinds = [type_of(space.fleet, uav) for uav in range(uavs)]
+    return [100 * float(space.data_sheet.share_of_type(kind)) for kind in kinds]
 
 
 def _places_of_uavs(missions: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -199,6 +199,7 @@ def test_what_follows_from_a_sheet_is_shown(dess, buoys, tmp_path):
     assert follows["out_of_reach"] == ["A", "B", "D"] and follows["largest_ratio"] == 0.25
     assert follows["steps"][-1] == [-7.5, pytest.approx(5468.75)]
     of_wing = {"tip_speed": "120 m/s", "induced_speed": "4.03 m/s", "hover": "28.77 min"}
+    of_wing["climb"] = "3 m/s"
     assert follows["assumed"] == {"altitude": "10 m", "message": "1 kB"} | of_wing
     assert follows["battery_per_slot"]["hover"] == 1.217
     assert (follows["slot_s"], follows["cell_m"], follows["data_unit_bit"]) == (21, 315, 2625e3)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dess import InputError
+from dess import InputError, ScenarioSpace
 from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.costs import (
     cost_front,
@@ -12,6 +12,8 @@ from dess.analysis.answers.fleet.costs import (
 from dess.analysis.metrics import metric_in_missions
 from dess.analysis.stats.intervals import interval_of
 from dess.analysis.stats.verdict import on_front
+from dess.analysis.study.prices import Costs, most_battery_per_slot
+from tests.analysis.small import SCENARIO, SHEET
 
 PRICES = {"uav": 1000, "pad": 100, "charge": 2, "hour": 6, "lost_uav": 1000}
 PRICES |= {"missions": 5, "slot_seconds": 60}
@@ -44,6 +46,18 @@ def test_a_cost_lies_between_the_purchase_and_the_loss_of_all_uavs(fixed):
     running = 5 * (uavs * (1000 + 2 * slots / 100) + 6 * slots / 60)
     assert (missions["most_cost"] - missions["least_cost"]).tolist() == pytest.approx([*running])
     assert missions["cost"].between(missions["least_cost"], missions["most_cost"]).all()
+
+
+def test_the_most_that_a_year_may_cost_counts_the_packs_of_the_smallest_uav():
+    """A UAV of half the endurance empties its pack twice as often."""
+    types = [{}, {"endurance": "17.5 min"}]
+    space = ScenarioSpace.of(**SCENARIO | SHEET | {"fleet": types, "uavs": 2})
+    plain = ScenarioSpace.of(**SCENARIO | SHEET | {"uavs": 2})
+    costs = Costs(years=1, days=10, pack=300.0, pack_cycles=100, lost_uav=50.0)
+    missions = {"point": [0, 1], "uavs": [2, 2]}
+    emptied = most_battery_per_slot(plain) * plain.max_slots / 100
+    most = [10 * 2 * (50 + 3 * packs * emptied) for packs in (2, 1)]
+    assert costs.most_running([space, plain], missions).tolist() == pytest.approx(most)
 
 
 def test_the_interval_of_a_mean_cost_is_that_of_its_own_fleet(fixed):
