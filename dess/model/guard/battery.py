@@ -3,7 +3,8 @@
 The guard counts batteries in percent; in missions whose slots have costs of their own
 (``dess.physics.consumption``), it counts them in thousandths of a percent. There the battery is no
 time any more, so that both must last: the battery for the cheapest way home, and the slots that are
-left for the shortest one. A slot of waiting or of a detour counts as the dearest one.
+left for the shortest one. A slot of waiting counts as the dearest one; a slot of a margin counts
+half of the dearest way forth and back, since a detour is one.
 """
 
 import math
@@ -28,9 +29,10 @@ LARGE_RATE = 0.6
 SCARCE_SLOTS = 6
 # In missions that end on the ground, those that stand are flown around, and batteries differ, so
 # that few UAVs come home together. There a UAV with teammates keeps the margin of one of them,
-# ``MARGIN_LANDING`` [slots] more, and a cell for each ``TEAMMATES_PER_CELL`` teammates.
+# ``MARGIN_LANDING`` [slots] more, and a cell for every second teammate; in a large fleet, where more
+# of them come together, for each but ``FEW_TEAMMATES``.
 MARGIN_LANDING = 3
-TEAMMATES_PER_CELL = 2
+FEW_TEAMMATES = 2
 # Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
 LAST_SLOTS = 16
 
@@ -244,5 +246,5 @@ def margin_slots(mission, u):
         return teammates * for_each
     if teammates == 0:
         return 0
-    cells = teammates // TEAMMATES_PER_CELL
+    cells = max(teammates // 2, teammates - FEW_TEAMMATES)
     return for_each + MARGIN_LANDING + cells * u.slots_per_cell
