@@ -29,8 +29,8 @@ LARGE_RATE = 0.6
 SCARCE_SLOTS = 6
 # In missions that end on the ground, those that stand are flown around, and batteries differ, so
 # that few UAVs come home together. There a UAV with teammates keeps the margin of one of them,
-# ``MARGIN_LANDING`` [slots] more, and a cell for every second teammate; in a large fleet, where more
-# of them come together, for each but ``FEW_TEAMMATES``.
+# ``MARGIN_LANDING`` [slots] more, and a cell for every second teammate; in a large fleet, where
+# more of them come together, for each but ``FEW_TEAMMATES``.
 MARGIN_LANDING = 3
 FEW_TEAMMATES = 2
 # Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
