@@ -86,7 +86,7 @@ def is_known(results: Results) -> bool:
 
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
-    return place_beside(results, "spare")
+    return place_beside(results, "one-more")
 
 
 def place_beside(results: Results, what: str) -> Path:
@@ -148,8 +148,10 @@ def table_around(results: Results) -> Table:
     return Table(cells, caption, data)
 
 
-def spare_sentence(results: Results) -> str:
-    """What a spare UAV costs and brings; empty if ``question_around`` does not know it.
+def one_more_sentence(results: Results) -> str:
+    """What one more UAV costs and brings; empty if ``question_around`` does not know it.
+
+    It flies all day: a spare that stands until another is lost is not simulated.
 
     Args:
         results: The study.
@@ -158,18 +160,21 @@ def spare_sentence(results: Results) -> str:
         return ""
     changed_results = load_results(_place_of_question(results))
     start, *rows = [point.values for point in changed_results.store.manifest.points]
-    with_spare = [n for n, row in enumerate(rows, 1) if row.get("uavs") != start.get("uavs")]
-    if not with_spare:
+    with_one_more = [n for n, row in enumerate(rows, 1) if row.get("uavs") != start.get("uavs")]
+    if not with_one_more:
         return ""
     costs = priced_settings(changed_results).set_index("point")[COST]
-    more = numbers.format_money(costs[with_spare[0]] - costs[0], results.prices.unit)
+    more = numbers.format_money(costs[with_one_more[0]] - costs[0], results.prices.unit)
     metric = search_of(results).best.tightest_first[0].metric
     differences = compare(
         changed_results.missions, 0, [metric.column], correction=None, of="point"
     ).set_index("point")
-    row = differences.loc[with_spare[0], ["difference", "low", "high"]]
+    row = differences.loc[with_one_more[0], ["difference", "low", "high"]]
     change = metric.change(*row)
-    return f"A spare UAV costs {more} more; with it, the {metric.within} changes by {change}."
+    return (
+        f"One more UAV, which flies all day, costs {more} more; with it, the {metric.within} "
+        f"changes by {change}."
+    )
 
 
 def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:

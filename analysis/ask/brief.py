@@ -2,14 +2,14 @@
 
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.risk import risk_sentence
-from dess.analysis.ask.around import spare_sentence
+from dess.analysis.ask.around import one_more_sentence
 from dess.analysis.ask.limits import limit_sentences
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 
 
 def brief_sentences(results: Results) -> list[str]:
-    """The risk of the cheapest fleet, what breaks it first, and what a spare UAV brings.
+    """The risk of the cheapest fleet, what breaks it first, and what one more UAV brings.
 
     Args:
         results: A study. Without a data sheet or a search for the cheapest fleet there are none.
@@ -21,6 +21,6 @@ def brief_sentences(results: Results) -> list[str]:
     sentences = [
         risk_sentence(results, best.policy, best.points),
         *limit_sentences(results),
-        spare_sentence(results),
+        one_more_sentence(results),
     ]
     return [sentence for sentence in sentences if sentence]

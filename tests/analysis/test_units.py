@@ -251,11 +251,11 @@ def test_the_fleet_is_asked_about_with_one_more(searched):
         column = metric_of(metric).name
         assert [text.split("(")[1].split()[0] for text in cells[column][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
-    # A spare UAV, in a sentence of the answer.
+    # One more UAV, in a sentence of the answer.
     spare = data["change"].tolist().index(f"{first['uavs'] + 1} UAVs")
     more = data["cost"][spare] - data["cost"][0]
-    text = around.spare_sentence(searched)
-    assert text.startswith(f"A spare UAV costs {more:,.0f} EUR more; with it, the ")
+    text = around.one_more_sentence(searched)
+    assert text.startswith(f"One more UAV, which flies all day, costs {more:,.0f} EUR more; ")
     tightest = search_of(searched).best.tightest_first[0].metric
     change = cells[tightest.name][spare].split("(")[1].rstrip(")")
     assert change in text

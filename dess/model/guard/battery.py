@@ -3,14 +3,16 @@
 The guard counts batteries in percent; in missions whose slots have costs of their own
 (``dess.physics.consumption``), it counts them in thousandths of a percent. There the battery is no
 time any more, so that both must last: the battery for the cheapest way home, and the slots that are
-left for the shortest one. A slot of waiting or of a detour counts as the dearest one.
+left for the shortest one. A slot of waiting counts as the dearest one; a slot of a margin counts
+half of the dearest way forth and back, since a detour is one.
 """
 
 import math
 
 from dess.base.kernels import inlined
+from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
 from dess.physics.charging import own_limit
-from dess.physics.consumption import has_consumption, thousandths_left
+from dess.physics.consumption import has_consumption, slot_cost, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
 from dess.physics.radio import has_limit
@@ -25,8 +27,12 @@ MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
 LARGE_RATE = 0.6
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
-# Further margin [slots] of a UAV with teammates in missions that end on the ground.
+# In missions that end on the ground, those that stand are flown around, and batteries differ, so
+# that few UAVs come home together. There a UAV with teammates keeps the margin of one of them,
+# ``MARGIN_LANDING`` [slots] more, and a cell for every second teammate; in a large fleet, where
+# more of them come together, for each but ``FEW_TEAMMATES``.
 MARGIN_LANDING = 3
+FEW_TEAMMATES = 2
 # Slots before the end of a mission without a quota in which UAVs do not leave a zone any more.
 LAST_SLOTS = 16
 
@@ -214,7 +220,18 @@ def lasts(mission, u):
 @inlined
 def margin(mission, u):
     """The battery that UAV ``u`` keeps on its way to the zone for detours around teammates."""
-    return dearest_slot(mission) * margin_slots(mission, u)
+    return _slot_of_detour(mission, u) * margin_slots(mission, u)
+
+
+@inlined
+def _slot_of_detour(mission, u):
+    """The battery for a slot of a detour, which goes forth and back, or of waiting."""
+    if not has_consumption(mission):
+        return 1
+    slots = u.slots_per_cell
+    across = slot_cost(mission, slots, NORTH) + slot_cost(mission, slots, SOUTH)
+    along = slot_cost(mission, slots, EAST) + slot_cost(mission, slots, WEST)
+    return max((max(across, along) + 1) // 2, slot_cost(mission, slots, HOVER))
 
 
 @inlined
@@ -224,5 +241,10 @@ def margin_slots(mission, u):
     A detour goes forth and back, so the wind costs the most in one direction only.
     """
     teammates = mission.active - 1
-    slots = teammates * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
-    return slots + MARGIN_LANDING if lands(mission) and teammates > 0 else slots
+    for_each = MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most
+    if not lands(mission):
+        return teammates * for_each
+    if teammates == 0:
+        return 0
+    cells = max(teammates // 2, teammates - FEW_TEAMMATES)
+    return for_each + MARGIN_LANDING + cells * u.slots_per_cell

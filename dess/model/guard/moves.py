@@ -98,6 +98,27 @@ def _ceded(mission, uavs, i):
 
 
 @inlined
+def _into_cells_of_others(mission, u, chart, planned):
+    """The moves of UAV ``u`` into the zone cells that teammates chose before it.
+
+    Such a teammate has less battery. If its cell was taken shortly before it comes, it would have
+    to fly on to another.
+
+    Returns:
+        A bit for each action.
+    """
+    moves = 0
+    for j in range(mission.uavs):
+        if planned[j] < 0:
+            continue
+        x, y = chart.parking[planned[j], 0], chart.parking[planned[j], 1]
+        for action in range(4):
+            if u.x + STEP_X[action] == x and u.y + STEP_Y[action] == y:
+                moves |= 1 << action
+    return moves
+
+
+@inlined
 def _is_in_the_way(mission, uavs, i):
     """Whether UAV ``i`` has just overruled a teammate that must charge and has less battery.
 
@@ -204,6 +225,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
             leaves = _one_of(clear & in_time & ~(1 << HOVER) or elsewhere, mission.slot)
         if leaves:
             return leaves
+    if charge and least == 0 and lands(mission):
+        nearest = nearest & ~_into_cells_of_others(mission, u, chart, planned) or nearest
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):

@@ -154,3 +154,20 @@ def test_uavs_land_beside_those_that_stand_in_their_way_at_the_end():
     space = ScenarioSpace.of(space, pads=3)
     ends = simulate_batch(space, policies.load("greedy"), 1_400_000, 8).uavs["end"]
     assert np.isin(ends[ends > 0], [LANDED]).all()
+
+
+def test_one_more_uav_does_not_collect_less():
+    """With a margin of two slots for each teammate, the fourth UAV collected 1 % less."""
+    ratios = []
+    for uavs in (2, 3, 4):
+        space = load_scenario("bay", landing=True, quota=0, uavs=uavs)
+        records = simulate_batch(space, policies.load("greedy"), 5, 60)
+        ratios.append(records.missions["collection_ratio"])
+    assert (ratios[1] - ratios[0]).mean() > 0 and (ratios[2] - ratios[1]).mean() > 0
+
+
+def test_no_uav_with_time_takes_the_cell_to_which_one_with_less_battery_comes():
+    """The one changed between two cells of the zone, and so did the plan of the other."""
+    space = load_scenario("bay", landing=True, quota=0, uavs=2)
+    records = simulate_batch(space, policies.load("greedy"), 11, [60, 334])
+    assert records.missions["success"].all()
