@@ -89,7 +89,7 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield Features, {"features": [{"geometry": point, "properties": {"Name": "A"}}]}
     yield Card, {"title": "", "finding": "", "picture": {"alt": "", "source": "", "narrow": ""}}
     yield Learned, {"files": {"a": ""}}
-    scenario = {"scenario": "paper", "named": {}, "baseline": {}, "variation": {}}
+    scenario = {"scenario": "paper", "given": {}, "baseline": {}, "variation": {}}
     yield Limits, {"missions": 1, "limits": [], "has_wind": False}
     yield Panel, scenario | {"policy": "greedy", "seed": 0, "module": "", "costs": {"uav": 1.0}}
     yield About, {"module": "", "code": "", "built_with": {"numba": "1"}}
