@@ -110,7 +110,7 @@ def lost_of(policy: str, kind: str, cells: int, uavs: int, missions: int) -> lis
     draws = np.random.default_rng([list(TIGHT).index(kind), cells, uavs])
     seas = [tight_space(kind, cells, uavs, draws) for _ in range(max(missions // 10, 1))]
     spaces = [seas[number % len(seas)] for number in range(missions)]
-    ends = simulate_batch(spaces, load(policy), SEED, missions).uavs["end"][:, :uavs]
+    ends = simulate_batch(spaces, load(policy), SEED, range(missions)).uavs["end"][:, :uavs]
     is_out = (ends == BATTERY) | ((ends == TRUNCATED) & (seas[0].quota == 0))
     return np.flatnonzero(is_out.any(axis=1)).tolist()
 

@@ -220,9 +220,10 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         leaves = elsewhere & empty or elsewhere & clear
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
             leaves = elsewhere & ~_ceded(mission, uavs, i)
-        if not leaves and u.overruled and u.zone >= 0 and is_tight(mission, chart):
-            # Who waits outside may want the same cell.
-            leaves = _one_of(clear & in_time & ~(1 << HOVER) or elsewhere, mission.slot)
+        if u.overruled and u.zone >= 0 and is_tight(mission, chart):
+            # A teammate may want the same cell again and again, so it tries one after another.
+            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere
+            leaves = _one_of(leaves, mission.slot)
         if leaves:
             return leaves
     if charge and least == 0 and lands(mission):
