@@ -15,7 +15,7 @@ PRIVATE = {
     r"flown": "simulated",
     r"dearer": "more expensive",
     r"(un)?lucky?": "by chance",
-    r"(?<!shipping )lanes?": "panel",
+    r"(?<!shipping[ -])lanes?": "panel",
     r"nobody": "no UAV, no reader",
     r"anew": "again",
     r"reckons? with": "takes into account",

@@ -267,7 +267,7 @@ class Flights(NamedTuple):
 
     Attributes:
         rate: The rate [1/h of flying].
-        hours: (N,) how long all UAVs of a mission have flown together [h].
+        hours: (N,) how long all UAVs of a mission were in the air together [h].
         failures: (N,) how many of them have failed.
         metrics: The metrics of the missions.
     """

@@ -105,7 +105,7 @@ class Craft(NamedTuple):
         speed = units.cell / units.slot / slots_per_cell
         climb = sheet.number("climb")
         hovering = scenario.consumption.slots[slots_per_cell - 1][-1] / PERCENT
-        # The wind makes hovering dearer; a climb takes so much more than hovering in still air.
+        # A climb takes so much more than hovering in still air; in wind, hovering takes more.
         extra = (sheet.wing.climbing_power(climb) - 1) / sheet.wing.power(speed)
         return cls(
             altitude,

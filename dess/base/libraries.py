@@ -5,7 +5,7 @@ In a clone of the repository, since no package index has ``dess``:
     pip install .               the simulator, all policies, evaluations, studies and sweeps
     pip install '.[learning]'   trainings
     pip install '.[reports]'    figures, pages, and studies of sensitivities
-    pip install '.[geo]'        lanes, buffers and circles of own seas, geofences of plans
+    pip install '.[geo]'        shipping lanes, buffers and circles of own seas, geofences of plans
     pip install '.[all]'        everything
     pip install '.[examples]'   the libraries of the examples, as far as they fit together
 

@@ -41,10 +41,10 @@ class HarvestSingleEnv(gymnasium.Env[Any, int]):
 
         Args:
             scenario: The scenario, or what ``load_scenario`` takes.
-            seed: As of ``HarvestEnv``.
-            render_mode: As of ``HarvestEnv``.
-            observation: As of ``HarvestEnv``.
-            guarded: As of ``HarvestEnv``.
+            seed: As for ``HarvestEnv``.
+            render_mode: As for ``HarvestEnv``.
+            observation: As for ``HarvestEnv``.
+            guarded: As for ``HarvestEnv``.
 
         Raises:
             InputError: If one of the arguments is not allowed.

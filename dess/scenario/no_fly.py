@@ -6,9 +6,9 @@
 Of polygons, a cell is a no-fly cell if its centre lies in one of them, and not in a hole; with
 ``touched``, every cell of which a part does. Points and lines close every cell that they touch, on
 an edge those of both sides; a line with a width, and a point with a ``radius`` of its own, every
-cell whose centre lies in the lane or the circle as well. A map in a text (``.txt``, ``.map``)
-has a line for each row of cells, one in a picture (``.png``) a pixel for each cell. Of a plan
-(``.plan``), the geofence closes cells, also those outside of what UAVs are kept in.
+cell whose centre is so near as well. A map in a text (``.txt``, ``.map``) has a line for each row
+of cells, one in a picture (``.png``) a pixel for each cell. Of a plan (``.plan``), the geofence
+closes cells, also those outside of what UAVs are kept in.
 """
 
 import io

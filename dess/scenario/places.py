@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field
 
-from dess.base.elementary import cos
+from dess.base.elementary import cos, hypot, sin
 from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.base.files.documents import Document
 from dess.base.files.reading import TEXT_LIMIT, read_text
@@ -104,7 +104,7 @@ class Projection(NamedTuple):
         spots = np.concatenate([corners, corners + [0.01, 0]])
         first, second = np.triu_indices(len(spots), 1)
         across = spots[first] - spots[second]
-        on_grid = np.sqrt((across**2).sum(1)) * self.cell_size
+        on_grid = hypot(across[:, 0], across[:, 1]) * self.cell_size
         degrees = np.radians(self.degrees(spots))
         half = np.sin((degrees[first] - degrees[second]) / 2) ** 2
         lats = np.cos(degrees[:, 1])
@@ -478,9 +478,11 @@ def _corners(value: Any, place: str) -> np.ndarray:
 
 
 def _ring_about(centre: np.ndarray, radius: float) -> np.ndarray:
-    angles = np.linspace(0, 2 * math.pi, _SIDES + 1)
-    degree = math.degrees(radius / EARTH_RADIUS)
-    away = np.stack([np.cos(angles) / math.cos(math.radians(centre[1])), np.sin(angles)], axis=1)
+    """(K, 2) longitudes and latitudes around a circle."""
+    degree = radius / EARTH_RADIUS / math.radians(1)
+    turns = [2 * math.pi * side / _SIDES for side in range(_SIDES + 1)]
+    narrow = cos(math.radians(centre[1]))
+    away = np.array([[cos(angle) / narrow, sin(angle)] for angle in turns])
     ring = centre + degree * away
     ring[-1] = ring[0]
     return ring

@@ -290,7 +290,7 @@ def _order_settings(
     )
     if table["n"].nunique() > 1:
         # Means over other replications do not compare: the longest of the leading ones is the
-        # reference, and the others are as far from it as where both were flown.
+        # reference, and the others are as far from it as where both were simulated.
         candidates = is_selected if is_selected.any() else table["tied"].to_numpy()
         longest = candidates & (table["n"] == table["n"][candidates].max()).to_numpy()
         reference = np.flatnonzero(longest)[np.argmin(leads[longest])]

@@ -27,7 +27,7 @@ MEAN_RATE, SLOTS_PER_PACKET = 0.3, 1.0
 LARGE_RATE = 0.6
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
-# In missions that end on the ground, those that stand are flown around, and batteries differ, so
+# In missions that end on the ground, UAVs fly around those that stand, and batteries differ, so
 # that few UAVs come home together. There a UAV with teammates keeps the margin of one of them,
 # ``MARGIN_LANDING`` [slots] more, and a cell for every second teammate; in a large fleet, where
 # more of them come together, for each but ``FEW_TEAMMATES``.

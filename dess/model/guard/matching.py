@@ -4,7 +4,7 @@ If each chose the best zone for itself, two UAVs could count on the last cell of
 the one that comes second may be too far from any other. So all UAVs are matched to the cells of
 zones together: no zone gets more UAVs than it has cells, and the battery and the slots that UAVs
 lack for their ways home are the least possible. A safe move keeps the zone in reach to which the
-state before it matches the UAV. So if nobody lacks anything in one slot, there is such a matching
+state before it matches the UAV. So if no UAV lacks anything in one slot, there is such a matching
 in the next one as well. The start zone has a cell for each UAV, so there always is a matching.
 
 Where UAVs take turns at pads, the plan of pads (``dess.model.guard.queues``) tells the zones.
@@ -19,7 +19,7 @@ from dess.model.guard.ways import is_parked
 from dess.physics.landing import lands
 
 # The price of a way home is the battery that it takes, and more for each unit that lacks for it and
-# the margin, and if it cannot be flown at all. No sum of lesser prices comes near a larger one.
+# the margin, and if it is not possible at all. No sum of lesser prices comes near a larger one.
 _LACKING, _UNREACHABLE = 2**24, 2**52
 _NO_WAY = 2**60
 

@@ -136,7 +136,7 @@ BAD = {
     "sweep --price uav=-1": "costs.uav: -1 is out of range",
     "sweep --price hour=3": "slot_seconds: is missing",
     "sweep --price uav=1 --require speed=0.9": "'speed' is unknown",
-    "sweep --price uav=1 --require success=2": "success: 2 is out of range",
+    "sweep --price uav=1 --require success=2": "success: 2.0 is out of range",
     "sweep --price uavs=3": "prices: 'uavs' is unknown",
     "sweep --name a/b": "name: 'a/b' has the wrong form",
     "sweep --price uav=0 --require ratio=0.9": "prices: all are 0",

@@ -50,7 +50,7 @@ BAD = {
         "no manifest.json",
         "allowed: a results folder, or a new or empty one",
     ],
-    "study show nope --csv --json": ["--csv: not with --json"],
+    "study show nope --csv --json": ["--csv, --json, --missions: given together"],
     "study": ["Missing command", "dess study --help"],
     "report mission": ["holds no results of 2 studies"],
     "report own-sea --parameter scenario='small.toml' --parameter fields={uavs=[1,2]}": [
