@@ -553,7 +553,8 @@ def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dic
             "percent": metric.in_percent,
             "unit": metric.unit,
             "less": metric.less_is_better,
-            "isOffered": name in offered,
+            "neutral": metric.is_neutral,
+            "isOffered": name in offered and not metric.is_neutral,
             "option": _REQUIRED.get(name, ""),
             "suffix": f" {metric.unit}" if name == AGE and space.units else "",
         }

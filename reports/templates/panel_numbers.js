@@ -9,6 +9,7 @@
  * @property {boolean} percent - whether it is a share, and is written in percent
  * @property {string} unit
  * @property {boolean} less - whether less is better
+ * @property {boolean} neutral - whether neither more nor less is better
  * @property {boolean} isOffered - whether a reader may require it
  * @property {string} suffix - of an amount on the command line
  * @property {string} option - its name on the command line, if a search can require it
@@ -82,13 +83,15 @@ function signed({percent}, number) {
 }
 
 /**
- * Whether B is better, or about how many more missions may decide it.
+ * Whether B is higher or lower, and better if that can be said, or about how many more missions may decide it.
  * @type {(metric: Metric, estimate: Estimate) => string}
  */
 function decision(metric, {mean, low, high, count}) {
     if (low > 0 || high < 0) {
+        const side = `decided: B is ${low > 0 ? "higher" : "lower"}`;
+        if (metric.neutral) return side;
         const isBetter = metric.less ? high < 0 : low > 0;
-        return `decided: B is ${low > 0 ? "higher" : "lower"}, which is ${isBetter ? "better" : "worse"}`;
+        return `${side}, which is ${isBetter ? "better" : "worse"}`;
     }
     if (!Number.isFinite(high - low)) return "not decided";
     if (low === high) return "no difference seen";
