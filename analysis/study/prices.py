@@ -192,12 +192,19 @@ class Costs(StrictTable):
         return text
 
     @property
+    def annuity_in_words(self) -> str:
+        """Over how many years UAVs and pads are paid off, and at what interest."""
+        years = self.years or 0.0
+        return (
+            f"UAVs and pads are paid off over {years:g} {numbers.inflect('year', years)} at "
+            f"{100 * self.interest:g} % interest"
+        )
+
+    @property
     def _year_in_words(self) -> str:
         """How UAVs, pads and packs are paid for in a year, and its missions."""
-        years = self.years or 0.0
         text = (
-            f"UAVs and pads are paid off over {years:g} {numbers.inflect('year', years)} at "
-            f"{100 * self.interest:g} % interest; "
+            f"{self.annuity_in_words}; "
             f"the fleet makes {numbers.format_count(self.paid_missions, 'mission')} a year."
         )
         if self.pack:

@@ -25,11 +25,20 @@ from dess.reports.pages import panel as panels
 from dess.reports.pages.html import fill_page
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
-from dess.reports.pages.panel import CHECKED, PORTION, hash_missions, make_another, make_panel
+from dess.reports.pages.panel import (
+    CHECKED,
+    PORTION,
+    Search,
+    hash_missions,
+    make_another,
+    make_panel,
+)
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
+from dess.scenario.scenario import ScenarioSpace
 from tests.flown import Engine
 
+PAPER = load_scenario("paper")
 SEED = 7
 MISSIONS = 120  # of a run
 PATIENCE = 60_000  # ms
@@ -84,9 +93,58 @@ def test_settings_of_a_data_sheet_are_told_in_its_words():
         for key, values in (("pads", [1, 2]), ("failures.uav_rate", [0.0, 0.0005]))
     }
     assert told["pads"]["name"] == "Number of charging pads in zone 1"
-    assert told["failures.uav_rate"]["texts"] == ["none", "one every 11.67 h"]
+    failures = told["failures.uav_rate"]
+    assert failures["texts"] == ["none", "one every 11.67 h"]
+    assert failures["name"] == "Failures of a UAV in flight, which is then lost for good"
     of_paper = panels._describe_setting("pads", [1, 2], load_scenario("paper"), None)
     assert of_paper["name"] == "Number of charging pads"
+    repaired = load_scenario("paper", failures={"uav_rate": 0.001, "uav_repair": 20.0})
+    failures = panels._describe_setting("failures.uav_rate", [0.0, 0.001], repaired, None)
+    assert failures["texts"] == ["none", "one every 1,000 mission slots"]
+    assert failures["name"].endswith("grounded for 20 mission slots in the mean")
+
+
+def test_wind_data_and_the_pads_of_every_zone_are_settings_where_there_is_a_sheet():
+    """They are values of the sheet, and make a page larger by a few kB."""
+    space = load_scenario("jade-bight")
+    settings = dict(panels._settings_of(space, space))
+    assert settings["data_sheet.wind"][0] == "0 m/s from SW"
+    assert "8 m/s from SW" in settings["data_sheet.wind"]
+    assert settings["data_sheet.data_rate"][:2] == ["0.75 MB/h", "1.5 MB/h"]
+    assert settings["pads"] == settings["zones.pads"] == [1, 2, 3, 4]
+    image = make_image(space, ["greedy"], SEED, PORTION, settings)
+    assert len(json.dumps(image.document()["sliders"])) < 10_000
+    assert not {*panels._OF_SHEET, "zones.pads"} & {*dict(panels._settings_of(PAPER, PAPER))}
+
+
+def test_rates_of_nodes_are_told_as_shares_of_those_of_the_sheet():
+    space = ScenarioSpace.of(load_scenario("jade-bight"), nodes=[[3, 3], [9, 9]], names=[])
+    space = ScenarioSpace.of(space, **{"data_sheet.data_rate": ["2 MB/h", "4 MB/h"]})
+    values = dict(panels._settings_of(space, space))["data_sheet.data_rate"]
+    told = panels._describe_setting("data_sheet.data_rate", values, space, None)
+    assert told["texts"][:2] == ["0.25 times the sheet's", "0.5 times the sheet's"]
+    assert values[0] == ["0.5 MB/h", "1 MB/h"]
+
+
+def test_the_prices_of_a_year_can_be_changed():
+    space = load_scenario("paper", uavs=2)
+    costs = Costs(uav=1000, years=5, interest=0.04, days=250, pack=350)
+    panel = str(make_panel(space, space, "paper", ["greedy"], SEED, costs).data)
+    assert {"days", "pack", "pack_cycles"} <= {*re.findall('name="price-([a-z_]+)"', panel)}
+    assert "UAVs and pads are paid off over 5 years at 4 % interest" in panel
+    assert '"unit": "EUR a year"' in panel
+
+
+@pytest.mark.parametrize("policy", ["greedy", "planner"])
+def test_the_grid_says_whose_answer_the_page_has(policy):
+    """Where the panel cannot simulate its policy, and why the grid may have another one."""
+    space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
+    search = Search(policy=policy, fleet="3 UAVs, 2 pads", tolerance=0.01, indifference=500)
+    about = Costs(uav=1000), [required], {"uavs": [1, 2], "pads": [1]}, {}, search
+    panel = str(make_panel(space, space, "paper", [policy], SEED, *about).data)
+    assert f"The answer of the page is 3 UAVs, 2 pads with {policy}" in panel
+    assert ("cannot simulate" in panel) == (policy == "planner")
+    assert '"tolerance": 0.01' in panel and '"indifference": 500' in panel
 
 
 @pytest.mark.parametrize("name", ["paper", "bay", "jade-bight"])
