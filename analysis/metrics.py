@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.base.errors import unknown_name
+from dess.base.errors import InputError, unknown_name
 from dess.model.record import MISSION_RECORD, measures_of
 from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import printed
@@ -31,6 +31,8 @@ class Metric:
             and of a ``cost`` is computed depends on what is known of rare missions
             (``stats.intervals.ends_of_means``).
         less_is_better: Whether a lower value is better.
+        is_neutral: Whether neither more nor less of it is better: it describes missions, and ranks
+            nothing.
         in_percent: Whether it is written in percent, and its differences in percentage points.
         sheet_unit: The unit where there is a data sheet; empty if in the same.
         horizons: The largest value that a mission can have, as a share of the longest that it may
@@ -54,6 +56,7 @@ class Metric:
     unit: str = ""
     kind: Kind = "number"
     less_is_better: bool = False
+    is_neutral: bool = False
     in_percent: bool = False
     sheet_unit: str = ""
     horizons: float = 0.0
@@ -249,6 +252,7 @@ def _amount_metric(
     unit: str = "",
     sheet_unit: str = "",
     less: bool = False,
+    neutral: bool = False,
 ) -> Metric:
     """A number that is not negative."""
     return Metric(
@@ -256,6 +260,7 @@ def _amount_metric(
         name,
         unit,
         less_is_better=less,
+        is_neutral=neutral,
         sheet_unit=sheet_unit,
         least=0.0,
     )
@@ -274,14 +279,14 @@ _MEASURED = (
     _time_metric(OLDEST, "Age of the oldest node", horizons=0.5, grows=True),
     _time_metric("latency", "Latency"),
     _time_metric("latency_p99", "99th percentile of the latency"),
-    _amount_metric("generated", "Packets generated"),
+    _amount_metric("generated", "Packets generated", neutral=True),
     _amount_metric("delivered", "Packets delivered"),
     _amount_metric("lost_packets", "Packets lost", less=True),
     _amount_metric("lost", "Data lost", _DATA, "MB", less=True),
     _amount_metric("queue", "UAVs waiting for a pad", less=True),
     _time_metric("waiting", "Waiting time for a pad", "min"),
-    _amount_metric("pad_requests", "Requests for a pad"),
-    Metric("utilisation", "Utilisation of the pads", kind="share"),
+    _amount_metric("pad_requests", "Requests for a pad", neutral=True),
+    Metric("utilisation", "Utilisation of the pads", kind="share", is_neutral=True),
     Metric("failures", "Failures of UAVs", less_is_better=True, least=0.0, failure=1.0),
     _time_metric("slots_grounded", "Time under repair", is_sum=True),
 )
@@ -528,20 +533,45 @@ def metrics_in(missions: Container[str]) -> list[str]:
     return [*ALWAYS, *others, *measured_in(missions)]
 
 
-def ranking_metrics(missions: Container[str]) -> list[str]:
-    """The metrics by which settings can be ranked: those that missions have, then their cost."""
+def told_metrics(missions: Container[str]) -> list[str]:
+    """The metrics that can be told of missions: those that they have, then their cost."""
     return [*metrics_in(missions), *(m.column for m in _OF_PRICES if m.column in missions)]
+
+
+def check_metric(metric: str, missions: Container[str]) -> None:
+    """Refuse a metric that these missions do not have.
+
+    Raises:
+        InputError: If they do not have it.
+    """
+    metrics = told_metrics(missions)
+    if metric not in metrics:
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
 
 
 def check_ranking_metric(metric: str, missions: Container[str]) -> None:
     """Refuse a metric by which these missions cannot be ranked.
 
     Raises:
-        InputError: If they do not have it.
+        InputError: If they do not have it, or more of it is neither better nor worse.
     """
-    metrics = ranking_metrics(missions)
-    if metric not in metrics:
-        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
+    check_metric(metric, missions)
+    refuse_neutral(metric)
+
+
+def refuse_neutral(metric: str, where: str = "metric") -> None:
+    """Refuse a metric that ranks nothing.
+
+    Args:
+        metric: The metric.
+        where: What names it, for messages.
+
+    Raises:
+        InputError: If more of it is neither better nor worse.
+    """
+    if metric_of(metric).is_neutral:
+        problem = f"more of {metric_of(metric).within} is neither better nor worse"
+        raise InputError(where, problem, "a metric that ranks settings, such as the product")
 
 
 def ranking_column(metric: str, missions: Container[str]) -> str:

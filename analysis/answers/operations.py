@@ -22,7 +22,7 @@ from dess.analysis.metrics import (
     PRODUCT,
     RATIO,
     SUCCESS,
-    check_ranking_metric,
+    check_metric,
     metric_in_missions,
     metric_of,
 )
@@ -117,7 +117,7 @@ def changes_from_reference(
     Raises:
         InputError: If there is no such metric, or the field never has the reference value.
     """
-    check_ranking_metric(metric, results.missions)
+    check_metric(metric, results.missions)
     table = values_of_points(results)
     if field not in table or reference not in table[field].to_numpy():
         raise InputError(field, f"is never {reference!r} in the study", "one of its values")

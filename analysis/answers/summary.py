@@ -116,11 +116,13 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """
     verdicts = pd.Series(ONLY, means.index, dtype=object)
     for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
+        measure = metric_in_missions(results.missions, str(metric))
+        if measure.is_neutral:
+            continue
         missions = results.missions[results.missions["point"] == point]
         wide = by_replication(missions, str(metric), "policy")
         values = wide[rows["policy"]].to_numpy(float)
         looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-        measure = metric_in_missions(results.missions, str(metric))
         verdicts[rows.index] = judge_alternatives(values, rows["low"], rows["high"], measure, looks)
     return means.assign(verdict=verdicts)
 

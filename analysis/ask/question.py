@@ -25,7 +25,15 @@ from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
-from dess.analysis.metrics import AGE, ALIASES, LEAST, METRICS, OLDEST, column_in_sheet_unit
+from dess.analysis.metrics import (
+    AGE,
+    ALIASES,
+    LEAST,
+    METRICS,
+    OLDEST,
+    column_in_sheet_unit,
+    refuse_neutral,
+)
 from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
@@ -94,13 +102,14 @@ class Question:
             where: What names it, for messages.
 
         Raises:
-            InputError: If the missions do not measure it.
+            InputError: If the missions do not measure it, or it ranks nothing.
         """
         measured = self.study.metrics
         column = column_in_sheet_unit(ALIASES.get(metric, metric), measured)
         if column not in measured:
             problem = f"{shown(metric)} is not measured"
             raise unknown_name(where, problem, metric, [*ALIASES, *measured])
+        refuse_neutral(column, where)
         return column
 
     def plan(self, workers: int = 1) -> list[Planned]:

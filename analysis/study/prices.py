@@ -192,12 +192,19 @@ class Costs(StrictTable):
         return text
 
     @property
+    def annuity_in_words(self) -> str:
+        """Over how many years UAVs and pads are paid off, and at what interest."""
+        years = self.years or 0.0
+        return (
+            f"UAVs and pads are paid off over {years:g} {numbers.inflect('year', years)} at "
+            f"{100 * self.interest:g} % interest"
+        )
+
+    @property
     def _year_in_words(self) -> str:
         """How UAVs, pads and packs are paid for in a year, and its missions."""
-        years = self.years or 0.0
         text = (
-            f"UAVs and pads are paid off over {years:g} {numbers.inflect('year', years)} at "
-            f"{100 * self.interest:g} % interest; "
+            f"{self.annuity_in_words}; "
             f"the fleet makes {numbers.format_count(self.paid_missions, 'mission')} a year."
         )
         if self.pack:
@@ -245,12 +252,20 @@ class Costs(StrictTable):
             price_of_uavs: The price of all UAVs together.
             pads: The number of pads.
         """
-        price = price_of_uavs + self.pad * pads
+        interest, worth = self.annuity
+        return (price_of_uavs + self.pad * pads) * interest / worth
+
+    @property
+    def annuity(self) -> tuple[float, float]:
+        """By what a purchase is multiplied, and then divided, for the amount of a year.
+
+        Both are 1 where UAVs and pads are bought once.
+        """
         if self.years is None:
-            return price
+            return 1.0, 1.0
         if self.interest == 0:
-            return price / self.years
-        return price * self.interest / -math.expm1(-self.years * math.log1p(self.interest))
+            return 1.0, self.years
+        return self.interest, -math.expm1(-self.years * math.log1p(self.interest))
 
     def prices_of_lost_uavs(self, space: ScenarioSpace, uavs: int) -> list[float]:
         """What it costs to lose each of the first UAVs of a scenario."""
@@ -279,7 +294,7 @@ class Costs(StrictTable):
         slots = np.array([space.max_slots for space in spaces])
         hours = slots * [self.seconds_per_slot(space) / 3600 for space in spaces]
         spent = slots * [most_battery_per_slot(space) for space in spaces]
-        smallest_packs = [min(_full_packs_of(space, space.uavs[1])) for space in spaces]
+        smallest_packs = [min(full_packs_of(space, space.uavs[1])) for space in spaces]
         packs = spent / smallest_packs / self.pack_cycles
         lost = np.array([max(self.prices_of_lost_uavs(space, space.uavs[1])) for space in spaces])
         of_uav = lost + self.charge * spent / 100 + self.pack * packs
@@ -429,11 +444,11 @@ def types_of_uavs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) 
 def _full_packs(spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any]) -> np.ndarray:
     """(u,) the full battery of each UAV, its reserve included [%]."""
     most = max(space.uavs[1] for space in spaces)
-    packs = np.array([_full_packs_of(space, most) for space in spaces])
+    packs = np.array([full_packs_of(space, most) for space in spaces])
     return packs[_places_of_uavs(missions)]
 
 
-def _full_packs_of(space: ScenarioSpace, uavs: int) -> list[float]:
+def full_packs_of(space: ScenarioSpace, uavs: int) -> list[float]:
     """The full battery of each of the first UAVs of a scenario, its reserve included [%]."""
     if not space.units:
         return [100.0] * uavs

@@ -26,7 +26,8 @@ from dess.analysis.metrics import (
     GAP,
     metric_of,
     metrics_of_scenario,
-    ranking_metrics,
+    refuse_neutral,
+    told_metrics,
 )
 from dess.analysis.study.cheapest import AnySelection, Cheapest
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
@@ -233,7 +234,7 @@ class Study(StudyData):
             measured |= {BOUND, GAP}
         if self.costs:
             measured |= {COST}
-        return ranking_metrics(measured)
+        return told_metrics(measured)
 
     def _choose_engine(self) -> None:
         """Take the SimPy engine if the study does not say which and a design point needs it."""
@@ -271,6 +272,7 @@ class Study(StudyData):
         elif isinstance(self.selection, Selection):
             key = "selection.metric"
             asked = {self.selection.metric}
+            refuse_neutral(self.selection.metric, key)
         elif isinstance(self.selection, Cheapest):
             self.selection.check_requirements(self.scenarios)
             return

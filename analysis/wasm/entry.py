@@ -45,9 +45,13 @@ METRICS = (
     "cost",
 )
 _MEASURED, _COST = 5, len(METRICS) - 1
-# What ``prices`` has: prices and missions of ``study.prices.Costs``, and the seconds of a slot. The
-# price of a lost UAV is nan if it is what the UAV was bought for.
-PRICES = ("uav", "pad", "charge", "hour", "lost_uav", "missions", "seconds")
+# What ``prices`` has: prices and paid missions of ``study.prices.Costs``, the seconds of a slot,
+# whether costs are those of a year, and the terms ``interest`` and ``worth`` by which a purchase is
+# multiplied and divided. The price of a lost UAV is nan if it is what the UAV was bought for.
+PRICES = (
+    *("uav", "pad", "charge", "hour", "lost_uav", "missions", "pack", "pack_cycles"),
+    *("seconds", "of_a_year", "interest", "worth"),
+)
 # The sums of ``totals``, for each metric over the missions that have it.
 TOTALS = ("count", "sum", "squares", "least", "most")
 
@@ -89,6 +93,7 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "node_records": (NODE_RECORD, 2),  # none: no page shows them
     "prices": (_F8, 1),
     "uav_prices": (_F8, 1),  # (I,) of UAVs whose types have prices, nan for those of ``prices``
+    "full_packs": (_F8, 1),  # (I,) the full battery of each UAV, its reserve included [%]
     "factors": (_F8, 1),  # of the metrics, where their unit is that of a data sheet
     "values": (_F8, 2),  # (B, METRICS)
     "baseline": (_F8, 2),  # (B, METRICS) values of other missions with the same replications
@@ -208,6 +213,7 @@ def prepare(table):
         neighbours = _array2(table, _AT.neighbours, _I4)
         fill_ways(row_by_row, neighbours, np.arange(zones.size), ways)
     mission = _array1(table, _AT.constants, _MISSION)[0]
+    mission.pads = _count_pads(mission)  # the pads of several zones may have been changed
     surcharges = np.zeros((4, *zones.shape), np.int64)
     if mission.wind_most > 0:
         fill_surcharges(
@@ -311,10 +317,13 @@ def measure(table, count):
     shape = (len(missions), _COST - _MEASURED)
     operations = carray(_pointer(table[_AT.operations]), shape, _F8)
     mission = _array1(table, _AT.constants, _MISSION)[0]
+    types = _array2(table, _AT.types, _UAV)[0]
     values = _array2(table, _AT.values, _F8)
     factors = _array1(table, _AT.factors, _F8)
     prices = _array1(table, _AT.prices, _F8)
     uav_prices = _array1(table, _AT.uav_prices, _F8)
+    packs = _array1(table, _AT.full_packs, _F8)
+    pads = _count_pads(mission)
     for row in range(count):
         record = missions[row]
         values[row, 0] = record.success
@@ -326,37 +335,69 @@ def measure(table, count):
             values[row, column] = operations[row, column - _MEASURED]
         values[row, _COST] = np.nan
         if len(prices) > 0:
-            values[row, _COST] = _cost(prices, uav_prices, mission.pads, record, uavs[row])
+            values[row, _COST] = _cost(prices, uav_prices, packs, pads, types, record, uavs[row])
         for column in range(values.shape[1]):
             values[row, column] *= factors[column]
 
 
 @kernel
-def _cost(prices, uav_prices, pads, record, uavs):
+def _count_pads(mission):
+    """The charging pads of all zones."""
+    pads = 0
+    for zone in range(len(mission.zone_pads)):
+        pads += mission.zone_pads[zone]
+    return pads
+
+
+@kernel
+def _cost(prices, uav_prices, packs, pads, types, record, uavs):
     """The cost of a mission, summed up from the parts of ``dess.analysis.study.prices``."""
     charge = prices[2]
     hour = prices[3]
     missions = prices[5]
-    seconds = prices[6]
+    pack = prices[6]
+    pack_cycles = prices[7]
+    seconds = prices[8]
+    is_of_a_year = prices[9] > 0
     charged = 0
+    emptied = 0.0
     losses = 0.0
     for i in range(record.uavs):
-        charged += uavs[i].charged
+        if is_of_a_year:  # the recharge after the mission is paid for, too
+            spent = _spent_battery(types[i], record, uavs[i])
+            charged += spent
+            emptied += spent / packs[i]
+        else:
+            charged += uavs[i].charged
         losses += uavs[i].down * _price_of_loss(prices, uav_prices, i)
-    purchase = _purchase(prices, uav_prices, pads, record.uavs)
-    charging = missions * charge * charged / 100
-    hours = missions * hour * (record.slots * seconds / 3600)
-    return purchase + charging + hours + missions * losses
+    cost = _purchase(prices, uav_prices, pads, record.uavs)
+    if is_of_a_year:
+        cost += missions * pack * emptied / pack_cycles
+    cost += missions * charge * charged / 100
+    cost += missions * hour * (record.slots * seconds / 3600)
+    return cost + missions * losses
+
+
+@kernel
+def _spent_battery(kind, record, uav):
+    """The battery that a UAV has spent in the air [%], as ``prices.spent_battery``."""
+    start = record.flying_time
+    if kind.battery > 0:
+        start = kind.battery
+    limit = np.int64(kind.charge_complete)
+    if limit > 0:
+        start = min(start, limit)
+    return start + uav.charged - uav.battery
 
 
 @kernel
 def _purchase(prices, uav_prices, pads, uavs):
-    """What UAVs and pads cost when they are bought."""
+    """What UAVs and pads cost when they are bought, or in each of the years of an annuity."""
     pad = prices[1]
     price_of_uavs = 0.0
     for i in range(uavs):
         price_of_uavs += _price_of_uav(prices, uav_prices, i)
-    return price_of_uavs + pad * pads
+    return (price_of_uavs + pad * pads) * prices[10] / prices[11]
 
 
 @kernel
@@ -390,12 +431,12 @@ def _bound_costs(table, bounds):
     largest = _array3(table, _AT.ranges, _I8)[0, 0, 1]
     hour = prices[3]
     missions = prices[5]
-    seconds = prices[6]
+    seconds = prices[8]
     uav_prices = _array1(table, _AT.uav_prices, _F8)
     losses = 0.0
     for i in range(largest):
         losses += _price_of_loss(prices, uav_prices, i)
-    bounds[_COST, 0] = _purchase(prices, uav_prices, mission.pads, smallest)
+    bounds[_COST, 0] = _purchase(prices, uav_prices, _count_pads(mission), smallest)
     hours = mission.max_slots * seconds / 3600
     bounds[_COST, 2] = missions * (losses + hour * hours)
 

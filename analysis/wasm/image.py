@@ -21,7 +21,7 @@ import numpy as np
 from dess.analysis.metrics import metric_for_length, metric_of, size_of
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.sequences import SEQUENCE
-from dess.analysis.study.prices import Costs, has_priced_types
+from dess.analysis.study.prices import Costs, full_packs_of, has_priced_types
 from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
 from dess.base.errors import InputError
 from dess.model.channel import empty_scratch, make_world
@@ -234,7 +234,7 @@ def _arrays_of(
         "residual": state.residual,
         "sensors": state.sensors,
         "teeth": np.zeros((1, teeth), np.int32),
-        "constants": starts.constants.view(MISSION),
+        "constants": _without_total(starts.constants.view(MISSION)),
         "ranges": starts.ranges,
         "types": types_of(space, fleet)[None],
         "data": starts.data,
@@ -257,6 +257,7 @@ def _arrays_of(
         "node_records": records.nodes,
         "prices": _prices_of(space, costs),
         "uav_prices": _prices_of_types(space, fleet),
+        "full_packs": np.array(full_packs_of(space, fleet)),
         "factors": _factors_of(space),
         "values": np.zeros((missions, len(METRICS))),
         "baseline": np.zeros((missions, len(METRICS))),
@@ -269,6 +270,13 @@ def _arrays_of(
         name: _without_content(arrays[name]) if name in SHAPES else _without_gaps(arrays[name])
         for name in ARRAYS
     }
+
+
+def _without_total(constants: np.ndarray) -> np.ndarray:
+    """The constants without the sum of all pads: ``prepare`` adds up those that settings change."""
+    copy = constants.copy()
+    copy["pads"] = 0
+    return copy
 
 
 def _without_content(array: np.ndarray) -> np.ndarray:
@@ -302,7 +310,15 @@ def _prices_of(space: ScenarioSpace, costs: Costs | None) -> np.ndarray:
     seconds = costs.slot_seconds or 0.0
     if space.units:
         seconds = space.units.slot
-    values = costs.model_dump() | {"seconds": seconds, "lost_uav": _price_of_loss(costs)}
+    interest, worth = costs.annuity
+    values = costs.model_dump() | {
+        "lost_uav": _price_of_loss(costs),
+        "missions": costs.paid_missions,
+        "seconds": seconds,
+        "of_a_year": costs.years is not None,
+        "interest": interest,
+        "worth": worth,
+    }
     return np.array([values[name] for name in PRICES], np.float64)
 
 

@@ -265,7 +265,8 @@ def parsed_scenario(text: str, path: Path, context: str = "") -> ScenarioSpace:
 def _load(
     name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
 ) -> ScenarioSpace:
-    where, read = found or _read(name_or_path, bool(merged({}, overrides).get("data_sheet")))
+    has_sheet = any(name.partition(".")[0] == "data_sheet" for name in overrides)
+    where, read = found or _read(name_or_path, has_sheet)
     with notes_after():
         return _of_values(name_or_path, where, read, overrides, context)
 

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: []
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -50,6 +51,9 @@ html.make_answer(best_settings_sentence(answer.results, ranked, PRODUCT))
 
 # %%
 html.lead_figure(*drawn[PRODUCT])
+
+# %%
+study.make_panel_of(answer.results, PRODUCT)
 
 # %% [markdown]
 # ## Why

@@ -13,6 +13,7 @@ import zlib
 from base64 import b64decode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import PurePath
 from types import MappingProxyType
@@ -20,7 +21,6 @@ from typing import Any
 
 from IPython.display import HTML, Markdown
 from markupsafe import Markup
-from pydantic import TypeAdapter
 
 from dess import InputError, simulate_batch
 from dess.analysis.answers.fleet.requirements import Requirement
@@ -36,8 +36,9 @@ from dess.analysis.metrics import (
     metric_of,
     size_of,
 )
-from dess.analysis.names import RANGES, field_named, value_text
+from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
+from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
 from dess.analysis.wasm.image import explain_refusal, make_image
@@ -58,6 +59,7 @@ from dess.reports.pages.html import (
 from dess.reports.pages.page import PANEL, hidden_element
 from dess.scenario.data_sheet import Units
 from dess.scenario.fields import dotted, is_number
+from dess.scenario.quantities import measured, printed, times
 from dess.scenario.scenario import SEA, ScenarioSpace, is_scenario_name
 
 PAPER = "paper"  # the scenario of the example of the index
@@ -74,10 +76,13 @@ _PRICED = {
     "hour": "An hour of a mission",
     "lost_uav": "A lost UAV",
     "missions": "Missions planned for the fleet",
+    "days": "Days of a year with a mission",
+    "pack": "A battery pack",
+    "pack_cycles": "Full charges after which a pack is worn",
 }
-_NO_COSTS = Markup(
-    '<p class="no-costs">The panel of this page has no costs, since they are those of a year.</p>\n'
-)
+_WHOLE = ("missions", "days")  # what is counted, 1 at least
+_MOST = {"days": 365}
+_MOST_AMOUNT = 10**12
 _NO_NODES = Markup(
     '<p class="no-costs">The panel of this page has no requirements, since it does not know what '
     "is collected of each node.</p>\n"
@@ -99,13 +104,33 @@ _LEVELS = {
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
-# The names of settings that are told as a time where the scenario has a data sheet.
-_RATES = {"failures.uav_rate": "Failures of a UAV"}
+# What a data sheet says, in which units, times these factors.
+_OF_SHEET = {
+    "data_sheet.data_rate": ("bit/s", (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)),
+    "data_sheet.wind": ("m/s from deg", (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)),
+}
+_RATES = ("failures.uav_rate",)  # settings that are told as the mean time between events
 _EXAMPLE_SETTINGS = ("uavs", "pads", "arrival_rate")
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 # What a search can require, by the names of the command line.
 _REQUIRED = {SUCCESS: "success", RATIO: "ratio", PRODUCT: "product", AGE: "age"}
-_OFFERED = (*_COUNTS, *_SCALED, *_LEVELS)
+_OFFERED = (*_COUNTS, ZONE_PADS, *_SCALED, *_OF_SHEET, *_LEVELS)
+
+
+class Search(Document):
+    """The search of a page for the cheapest fleet, of which the grid of its panel is a part.
+
+    Attributes:
+        policy: The policy of its answer.
+        fleet: The fleet of its answer, in words; empty if there is none.
+        tolerance: How far from a requirement either verdict is right, as a share.
+        indifference: The least saving that matters, in the currency.
+    """
+
+    policy: str
+    fleet: str
+    tolerance: float
+    indifference: float
 
 
 class Panel(Document):
@@ -123,6 +148,7 @@ class Panel(Document):
         costs: The prices, if the missions have costs.
         requirements: The bounds on the means of metrics that the page is about.
         varied: By setting, the values that the study of the page has.
+        search: What the grid has of the search of the page, if that is one.
         is_single: Whether it only shows single missions of the baseline.
     """
 
@@ -136,6 +162,7 @@ class Panel(Document):
     costs: Costs | None = None
     requirements: dict[str, float] = {}
     varied: dict[str, list[Any]] = {}
+    search: Search | None = None
     is_single: bool = False
 
     @property
@@ -168,7 +195,7 @@ class Panel(Document):
         }
         fixed = [key for key in self.given if key not in settings]
         fleet = len(image.arrays["uavs"][0])
-        metrics = [*_describe_metrics(baseline, self.costs)]
+        metrics = [*_describe_metrics(baseline, self.costs, self.search)]
         data = {
             "settings": [
                 _describe_setting(key, values, baseline, self._default_of(baseline, key))
@@ -181,6 +208,7 @@ class Panel(Document):
             "prices": [*_describe_prices(self.costs)],
             "priced": [*_other_prices(self.costs)],
             "grid": self._grid(settings),
+            "indifference": self.search.indifference if self.search else 0.0,
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
             "scenario": self.scenario,
@@ -201,10 +229,29 @@ class Panel(Document):
                 sides=SIDES,
                 script=panel_script(SINGLE_SCRIPT if self.is_single else PANEL_SCRIPT),
                 currency=self.costs.currency if self.costs else "",
+                year=self.costs.annuity_in_words if self.costs and self.costs.years else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
                 missions=MISSIONS,
+                differs=self._why_the_grid_differs(),
                 required=[*_describe_requirements(self.requirements, metrics)],
             ).data
+        )
+
+    def _why_the_grid_differs(self) -> str:
+        """Whose answer the page has, and why that of the grid may be another one."""
+        if self.search is None or not self.search.fleet:
+            return ""
+        answer = f"The answer of the page is {self.search.fleet} with {self.search.policy}"
+        if self.search.policy == self.policy:
+            return (
+                f"{answer}. The grid has the same requirements and tolerance, but intervals that "
+                "hold however often you look, which are wider; where it leaves open what the page "
+                "has decided, the page is the evidence."
+            )
+        return (
+            f"{answer}, which this page cannot simulate: its panel has heuristics alone. The grid "
+            f"is of {self.policy}, which may need another fleet. So its cheapest fleet may differ "
+            "from that of the page, and then both are right, each of its own policy."
         )
 
     def _default_of(self, baseline: ScenarioSpace, key: str) -> Any:
@@ -238,6 +285,7 @@ def make_panel(
     requirements: Sequence[Requirement] = (),
     varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),
     given: Mapping[str, Any] = MappingProxyType({}),
+    search: Search | None = None,
 ) -> HTML | Markdown:
     """The panel of a baseline and a variation; a sentence instead where it is not possible.
 
@@ -249,20 +297,19 @@ def make_panel(
         policies: The policies of the page; the first that the module knows is the one to begin
             with, otherwise ``greedy``.
         seed: The seed of the missions.
-        costs: The prices, if the missions have costs. The panel has no costs of a year.
+        costs: The prices, if the missions have costs.
         requirements: Those that the page is about.
         varied: By setting, the values that the study of the page has, which the panel has too.
         given: The fields of the scenario that the page sets, and their values in A.
+        search: What the grid has of the search of the page, if that is one.
     """
     note = _NO_NOTE
-    if costs is not None and costs.years is not None:
-        costs = None
-        note = _NO_COSTS
     if any(requirement.column in NODES_BEHIND for requirement in requirements):
-        note += _NO_NODES
+        note = _NO_NODES
         requirements = ()  # a fleet that keeps only the others would be called right
     more = {
         "costs": costs,
+        "search": search,
         "requirements": {
             name: requirement.bound
             for requirement in requirements
@@ -270,7 +317,7 @@ def make_panel(
             if requirement.column in (name, metric_of(name).in_units.column)
         },
         "varied": {
-            key: [value for value in values if is_number(value)]
+            key: [value for value in values if is_number(value) or key in _OF_SHEET]
             for key, values in varied.items()
             if key in _OFFERED
         },
@@ -416,29 +463,64 @@ def _settings_of(
     varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),
 ) -> Iterator[tuple[str, list[Any]]]:
     """The settings of the panel: by field, the values that the scenario allows, in their order."""
+    ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
+    differing = [key for key in ours | theirs if ours.get(key) != theirs.get(key)]
+    # Another line of the data sheet would change the same words of the arrays.
+    has_other_sheet = any(key.startswith("data_sheet.") for key in {*differing} - {*_OF_SHEET})
     for key in _OFFERED:
+        if key in _OF_SHEET and has_other_sheet:
+            continue
+        if not _has_setting(baseline, key) or not _has_setting(variation, key):
+            continue
         present = [_value_of(space, key) for space in (baseline, variation)]
         values = [*_candidates_of(baseline, key, present), *varied.get(key, ())]
         allowed = [value for value in values if _is_allowed(baseline, key, value)]
-        ordered = _in_order([*allowed, *present])
+        ordered = _in_order(key, [*allowed, *present])
         if len(ordered) > 1:
             yield key, ordered
-    ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
-    for key in ours | theirs:
-        if key not in _OFFERED and ours.get(key) != theirs.get(key):
+    for key in differing:
+        if key not in _OFFERED:
             yield key, [_value_of(space, key) for space in (baseline, variation)]
 
 
 def _candidates_of(space: ScenarioSpace, key: str, present: Sequence[Any]) -> Sequence[Any]:
     """The values of a setting that are offered on any page."""
-    if key in _COUNTS:
-        most = max([_COUNTS[key], *(value for value in present if isinstance(value, int))])
+    if key in (*_COUNTS, ZONE_PADS):
+        usual = _COUNTS.get(key, _COUNTS["pads"])
+        most = max([usual, *(value for value in present if isinstance(value, int))])
         return range(1, min(most, _MOST_POSITIONS) + 1)
+    if key in _OF_SHEET:
+        return [_times(space.plain_value(key), factor) for factor in _OF_SHEET[key][1]]
     if key in _SCALED:
         value = getattr(space, key)
         scaled = [float(f"{factor * value:.6g}") for factor in _SCALED[key]]
         return [*map(round, scaled)] if isinstance(value, int) else scaled
     return _LEVELS[key]
+
+
+def _has_setting(space: ScenarioSpace, key: str) -> bool:
+    """Whether a scenario has what a setting changes: further zones, or a line of its data sheet."""
+    if key == ZONE_PADS:
+        return bool(space.zones)
+    if key in _OF_SHEET:
+        return bool(space.units and space.value(key))
+    return True
+
+
+def _times(value: Any, factor: float) -> Any:
+    """What a data sheet says, times a factor: a text, or one for each node."""
+    if factor == 1.0:
+        return value
+    if isinstance(value, str):
+        return times(value, factor)
+    return [times(of_node, factor) for of_node in value]
+
+
+def _amount_of(key: str, value: Any) -> float:
+    """The amount of what a data sheet says; of a list for the nodes, that of the first."""
+    if not isinstance(value, str):
+        value = value[0]
+    return measured(value, _OF_SHEET[key][0])[0]
 
 
 def _is_allowed(space: ScenarioSpace, key: str, value: Any) -> bool:
@@ -454,18 +536,22 @@ def _value_of(space: ScenarioSpace, key: str) -> Any:
     if key == "pads" and space.pads is None:
         *_, width, height = space.zone
         return width * height
-    value: Any = space
-    for part in key.split("."):
-        value = getattr(value, part)
-    value = TypeAdapter(Any).dump_python(value, mode="json")
+    value = space.plain_value(key)
+    if key == ZONE_PADS and len({*value}) == 1:
+        return value[0]
     if key in RANGES and value[0] == value[1]:
         return value[0]
     return value
 
 
-def _in_order(values: Sequence[Any]) -> list[Any]:
-    """Each value once: ranges, which differ between missions, before numbers."""
+def _in_order(key: str, values: Sequence[Any]) -> list[Any]:
+    """Each value once: ranges, which differ between missions, before numbers.
+
+    What a data sheet says is in the order of the amounts.
+    """
     different = [value for n, value in enumerate(values) if value not in values[:n]]
+    if key in _OF_SHEET:
+        return sorted(different, key=partial(_amount_of, key))
     numbers = sorted(value for value in different if not isinstance(value, list))
     return [value for value in different if isinstance(value, list)] + numbers
 
@@ -495,9 +581,12 @@ def _describe_setting(
         place = " in zone 1"
     name, unit = field.name, field.unit
     texts = [value_text(value) for value in values]
-    if key in _RATES and space.units:
-        name, unit = _RATES[key], ""
+    if key in _RATES:
+        name, unit = _failure_in_words(space), ""
         texts = [_time_between(rate, space.units) for rate in values]
+    if key in _OF_SHEET and not isinstance(values[0], str):
+        listed = _amount_of(key, space.plain_value(key))
+        texts = [f"{_amount_of(key, of_nodes) / listed:g} times the sheet's" for of_nodes in values]
     return {
         "default": values.index(default) if default in values else None,
         "key": key,
@@ -510,21 +599,47 @@ def _describe_setting(
     }
 
 
-def _time_between(rate: float, units: Units) -> str:
+def _time_between(rate: float, units: Units | None) -> str:
     """A rate per mission slot as the mean time from one event to the next."""
     if rate == 0.0:
         return "none"
+    if units is None:
+        return f"one every {format_quantity(1 / rate)} mission slots"
     return f"one every {format_quantity(size_of('h', units) / rate)} h"
+
+
+def _failure_in_words(space: ScenarioSpace) -> str:
+    """What a failure of a UAV does, and for how long."""
+    repair = space.failures.uav_repair
+    if repair == 0.0:
+        return "Failures of a UAV in flight, which is then lost for good"
+    length = f"{format_quantity(repair)} mission slots"
+    if space.units:
+        length = printed(repair * space.units.slot, "s")
+    return f"Failures of a UAV in flight, which is then grounded for {length} in the mean"
 
 
 def _describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
     """The prices that a reader may change, in the order in which the module has them."""
-    if costs is not None:
-        for name in PRICES[: PRICES.index("seconds")]:
-            value = getattr(costs, name)
-            if name == "lost_uav" and value is None and not costs.pays_for_losses:
-                value = 0.0
-            yield {"name": name, "label": _PRICED[name], "value": value}
+    if costs is None:
+        return
+    names = list(PRICES[: PRICES.index("seconds")])
+    if costs.years is None:
+        names = names[: names.index("pack")]
+    else:
+        names[names.index("missions")] = "days"
+    for name in names:
+        value = getattr(costs, name)
+        if name == "lost_uav" and value is None and not costs.pays_for_losses:
+            value = 0.0
+        yield {
+            "name": name,
+            "label": _PRICED[name],
+            "value": value,
+            "least": int(name in (*_WHOLE, "pack_cycles")),
+            "most": _MOST.get(name, _MOST_AMOUNT),
+            "isWhole": name in _WHOLE,
+        }
 
 
 def _other_prices(costs: Costs | None) -> Iterator[str]:
@@ -533,17 +648,25 @@ def _other_prices(costs: Costs | None) -> Iterator[str]:
         yield f"currency={costs.currency}"
         if costs.slot_seconds is not None:
             yield f"slot_seconds={costs.slot_seconds:g}"
+        if costs.years is not None:
+            yield f"years={costs.years:g}"
+            yield f"interest={costs.interest:g}"
 
 
-def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dict[str, Any]]:
+def _describe_metrics(
+    space: ScenarioSpace, costs: Costs | None, search: Search | None = None
+) -> Iterator[dict[str, Any]]:
     """What the panel writes of each metric, by its column in the values of missions."""
+    tolerance = Cheapest.model_fields["tolerance"].default
+    if search is not None:
+        tolerance = search.tolerance
     offered = {*METRICS[: METRICS.index("reward")], *measures_of(space)}
     if costs is not None:
         offered.add("cost")
     for column, name in enumerate(METRICS):
         metric = metric_of(name)
         if metric.kind == "cost" and costs is not None:
-            metric = replace(metric, unit=costs.currency)
+            metric = replace(metric, unit=costs.unit)
         if space.units:
             metric = metric.in_units
         yield {
@@ -553,10 +676,21 @@ def _describe_metrics(space: ScenarioSpace, costs: Costs | None) -> Iterator[dic
             "percent": metric.in_percent,
             "unit": metric.unit,
             "less": metric.less_is_better,
-            "isOffered": name in offered,
+            "neutral": metric.is_neutral,
+            "isOffered": name in offered and not metric.is_neutral,
             "option": _REQUIRED.get(name, ""),
+            "tolerance": _tolerance_of(name, tolerance, space),
             "suffix": f" {metric.unit}" if name == AGE and space.units else "",
         }
+
+
+def _tolerance_of(name: str, share: float, space: ScenarioSpace) -> float:
+    """How far from a bound of a metric either verdict of the grid is right."""
+    if name == AGE:
+        return share * horizon_of(space)
+    if name in _REQUIRED:
+        return share
+    return 0.0
 
 
 def _describe_requirements(

@@ -35,7 +35,7 @@ from dess.analysis.study.selection import Selection
 from dess.policies.registry import is_path, list_departures
 from dess.reports.pages import PREFIX, html, notebook
 from dess.reports.pages.notebook import Report, cell_tags
-from dess.reports.pages.panel import make_panel
+from dess.reports.pages.panel import Search, make_panel
 from dess.scenario.scenario import SEA
 
 _MOST_FIELDS = 3  # the largest number of fields that a title names
@@ -240,9 +240,20 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         metric: The metric that ranks the settings, if it is not that of the study.
     """
     point, policy = 0, results.policies[0]
-    if isinstance(results.study.selection, Cheapest):
+    found = None
+    rule = results.study.selection
+    if isinstance(rule, Cheapest):
         search = search_of(results)
         point, policy = search.shown_point, search.best.policy
+        fleet = ""
+        if search.best.points:
+            fleet = search.best.fleet
+        found = Search(
+            policy=policy,
+            fleet=fleet,
+            tolerance=rule.tolerance,
+            indifference=rule.indifference,
+        )
     elif results.design != "saltelli":
         best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
         point, policy = int(best.point), best.policy
@@ -250,7 +261,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     about = results.study.costs, requirements_of(results), varied_values(results)
     given = results.given_values(point)
-    return make_panel(space, space, name, [policy], manifest.seed, *about, given)
+    return make_panel(space, space, name, [policy], manifest.seed, *about, given, found)
 
 
 def draw_typical_mission(results: Results) -> list[Drawing]:

@@ -23,8 +23,11 @@ const missions = named("missions");
 const priceInputs = data.prices.map(({name}) => named(`price-${name}`));
 // An empty price of a lost UAV is what the UAV was bought for, where the page has that.
 const isAsBought = (/** @type {any} */ input) => input.value === "" && input.placeholder !== "";
-const prices = () => priceInputs.map((input) =>
-    isAsBought(input) ? NaN : Math.min(Math.max(Number(input.value) || 0, 0), 1e12));
+const prices = () => priceInputs.map((input, n) => {
+    if (isAsBought(input)) return NaN;
+    const {least, most, isWhole} = data.prices[n], amount = Math.min(Math.max(Number(input.value) || 0, least), most);
+    return isWhole ? Math.round(amount) : amount;
+});
 const required = [...root.querySelectorAll("[data-panel=requirement]")].map((line, n) =>
     ({line, metric: named(`require-${n}`), bound: named(`bound-${n}`), slider: named(`slide-${n}`)}));
 
@@ -226,7 +229,7 @@ function fill() {
             const name = `${counted("uavs", uavs, "UAV")}, ${counted("pads", pads, "pad")}`;
             return {uavs, pads, name, track: trackOf(`${uavs} ${pads}`, chosen, error)};
         });
-        grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"));
+        grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"), data.indifference);
         gridKey = keyOfGrid();
     }
     grid.extend(Math.min(grid.count + askedOfGrid(), MOST_MISSIONS));

@@ -21,11 +21,13 @@ class Grid {
      * @param {Cell[]} cells
      * @param {Requirement[]} requirements
      * @param {Metric} cost
+     * @param {number} indifference - the least saving that matters
      */
-    constructor(cells, requirements, cost) {
+    constructor(cells, requirements, cost, indifference) {
         this.cells = cells;
         this.requirements = requirements;
         this.cost = cost;
+        this.indifference = indifference;
         this.isOver = true;
         this.target = 0; // missions in all
         this.away = 0; // orders that are not answered
@@ -52,25 +54,47 @@ class Grid {
     }
 
     hasWork() {
-        return this.asked < this.target && this.cells.some((cell) => this.isUndecided(cell));
+        return this.asked < this.target && this.needed().length > 0;
     }
 
     /** @param {Cell} cell */
-    isUndecided(cell) {
-        return cell.track.series.count < FEWEST || this.verdict(cell) === "open";
+    costOf(cell) {
+        return cell.track.series.estimate(this.cost);
     }
 
-    // The next missions of a cell that is not decided. The cells take turns by blocks, since a worker
-    // has the arrays of few cells at a time.
+    /**
+     * The cells whose missions decide which is the cheapest, as in the search of a study. First, all
+     * have a few. Until a cell meets the requirements, they are those that cost no more than one
+     * whose means meet them, or hardly more; then this cell and those that may be cheaper.
+     * @returns {Cell[]}
+     */
+    needed() {
+        const begun = this.cells.filter(({track}) => track.asked < FEWEST);
+        if (begun.length) return begun;
+        if (this.cells.some(({track}) => track.series.count < FEWEST)) return [];
+        const answer = this.cheapest();
+        if (answer) return answer.rivals.length ? [answer.cell, ...answer.rivals] : [];
+        const possible = this.cells.filter((cell) => this.verdict(cell) === "open");
+        const isPromising = (/** @type {Cell} */ {track}) => this.requirements.every((required) =>
+            roomOf(required, track.series.estimate(required.metric).mean) >= 0);
+        const most = Math.min(...possible.filter(isPromising).map((cell) => this.costOf(cell).mean)) + this.indifference;
+        return possible.filter((cell) => this.costOf(cell).mean <= most);
+    }
+
+    // The next missions of a cell that is needed, the cheapest first. The cells take turns by blocks,
+    // since a worker has the arrays of few cells at a time.
     next() {
         if (!this.hasWork()) return null;
-        const turns = (/** @type {Cell} */ {track}) => Math.floor(track.asked / BLOCK);
-        const isBefore = (/** @type {Cell} */ one, /** @type {Cell} */ other) =>
-            turns(one) < turns(other) || (turns(one) === turns(other) && one.track.asked > other.track.asked);
-        const undecided = this.cells.filter((cell) => this.isUndecided(cell));
-        const {track} = undecided.reduce((first, other) => isBefore(other, first) ? other : first);
+        const needed = this.needed(), turns = (/** @type {Cell} */ {track}) => Math.floor(track.asked / BLOCK);
+        const isBefore = (/** @type {Cell} */ one, /** @type {Cell} */ other) => {
+            if (turns(one) !== turns(other)) return turns(one) < turns(other);
+            if (one.track.asked !== other.track.asked) return one.track.asked > other.track.asked;
+            return this.costOf(one).mean < this.costOf(other).mean;
+        };
+        const {track} = needed.reduce((first, other) => isBefore(other, first) ? other : first);
+        const most = track.asked < FEWEST ? FEWEST - track.asked : Infinity;
         this.away += 1;
-        return track.next(this.target - this.asked);
+        return track.next(Math.min(most, this.target - this.asked));
     }
 
     /** @param {Answer} answer */
@@ -84,27 +108,27 @@ class Grid {
     }
 
     /**
-     * What is known of the requirements together: the most serious of what is known of each.
+     * What is known of the requirements together, within their tolerances: the most serious of what is known of each.
      * @param {Cell} cell
      * @returns {Verdict}
      */
     verdict({track}) {
-        const verdicts = this.requirements.map((required) => verdict(required, track.series.estimate(required.metric)));
+        const verdicts = this.requirements.map((required) => verdict(required, track.series.estimate(required.metric), required.metric.tolerance));
         return verdicts.includes("misses") ? "misses" : verdicts.includes("open") ? "open" : "meets";
     }
 
     /**
-     * The cell with the least mean cost that meets the requirements, and those that may be cheaper
-     * and do not miss them.
+     * The cell with the least mean cost that meets the requirements, and those that may be cheaper,
+     * by more than the indifference, and do not miss them.
      * @returns { {cell: Cell, rivals: Cell[]} | null}
      */
     cheapest() {
-        const costs = new Map(this.cells.map((cell) => [cell, cell.track.series.estimate(this.cost)]));
+        const costs = new Map(this.cells.map((cell) => [cell, this.costOf(cell)]));
         const good = this.cells.filter((cell) => this.verdict(cell) === "meets" && costs.get(cell).count >= FEWEST);
         if (!good.length) return null;
         const cell = good.reduce((least, other) => costs.get(other).mean < costs.get(least).mean ? other : least);
         const rivals = this.cells.filter((other) =>
-            other !== cell && !(costs.get(other).low >= costs.get(cell).high) && this.verdict(other) !== "misses");
+            other !== cell && !(costs.get(cell).high - costs.get(other).low <= this.indifference) && this.verdict(other) !== "misses");
         return {cell, rivals};
     }
 

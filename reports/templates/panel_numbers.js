@@ -9,7 +9,9 @@
  * @property {boolean} percent - whether it is a share, and is written in percent
  * @property {string} unit
  * @property {boolean} less - whether less is better
+ * @property {boolean} neutral - whether neither more nor less is better
  * @property {boolean} isOffered - whether a reader may require it
+ * @property {number} tolerance - how far from a bound either verdict of the grid is right
  * @property {string} suffix - of an amount on the command line
  * @property {string} option - its name on the command line, if a search can require it
  */
@@ -82,13 +84,15 @@ function signed({percent}, number) {
 }
 
 /**
- * Whether B is better, or about how many more missions may decide it.
+ * Whether B is higher or lower, and better if that can be said, or about how many more missions may decide it.
  * @type {(metric: Metric, estimate: Estimate) => string}
  */
 function decision(metric, {mean, low, high, count}) {
     if (low > 0 || high < 0) {
+        const side = `decided: B is ${low > 0 ? "higher" : "lower"}`;
+        if (metric.neutral) return side;
         const isBetter = metric.less ? high < 0 : low > 0;
-        return `decided: B is ${low > 0 ? "higher" : "lower"}, which is ${isBetter ? "better" : "worse"}`;
+        return `${side}, which is ${isBetter ? "better" : "worse"}`;
     }
     if (!Number.isFinite(high - low)) return "not decided";
     if (low === high) return "no difference seen";
@@ -105,12 +109,20 @@ function requirementInWords({metric, bound}) {
 }
 
 /**
- * Whether a whole interval keeps a bound (*meets*), breaks it (*misses*), or neither (*open*).
- * @type {(requirement: Requirement, estimate: Estimate) => "meets" | "misses" | "open"}
+ * By how much a mean, or an end of its interval, keeps a bound; negative if it breaks it.
+ * @type {(requirement: Requirement, number: number) => number}
  */
-function verdict({metric, bound}, {low, high, count}) {
+const roomOf = ({metric, bound}, number) => metric.less ? bound - number : number - bound;
+
+/**
+ * Whether a whole interval keeps a bound (*meets*), breaks it (*misses*), or neither (*open*). Within
+ * the tolerance of the bound, either verdict is right: the mean decides where both are known.
+ * @type {(requirement: Requirement, estimate: Estimate, tolerance?: number) => "meets" | "misses" | "open"}
+ */
+function verdict(requirement, {mean, low, high, count}, tolerance = 0) {
     if (!count) return "open";
-    const [worst, best] = metric.less ? [bound - high, bound - low] : [low - bound, high - bound];
-    if (worst >= 0) return "meets";
-    return best < 0 ? "misses" : "open";
+    const rooms = [low, high].map((end) => roomOf(requirement, end));
+    const isMet = Math.min(...rooms) >= -tolerance, isMissed = Math.max(...rooms) < tolerance;
+    if (isMet && isMissed) return roomOf(requirement, mean) >= 0 ? "meets" : "misses";
+    return isMet ? "meets" : isMissed ? "misses" : "open";
 }

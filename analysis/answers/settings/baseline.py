@@ -15,7 +15,7 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.metrics import (
     METRICS,
-    check_ranking_metric,
+    check_metric,
     metric_in_missions,
     metric_of,
 )
@@ -74,7 +74,7 @@ def compare_with_baseline(
     check_baseline(results, point)
     tables = []
     for metric in metrics:
-        check_ranking_metric(metric, results.missions)
+        check_metric(metric, results.missions)
         parts = []
         for policy, missions in results.missions.groupby("policy", sort=False):
             wide = by_replication(missions, metric, "point")

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [age]
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -21,6 +22,7 @@ from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
 from dess.analysis.metrics import AGE, RATIO, metric_of
 from dess.reports.pages import html
+from dess.reports.pages import study as page
 
 # %%
 study = load_results(f"{results}/age")
@@ -33,6 +35,9 @@ html.make_answer(operations.age_sentence(study))
 
 # %%
 html.lead_figure(*lead)
+
+# %%
+page.make_panel_of(study, AGE)
 
 # %% [markdown]
 # ## Why

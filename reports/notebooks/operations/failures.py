@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [failures]
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -24,6 +25,7 @@ from dess.analysis.answers import operations
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.reports.pages import html
+from dess.reports.pages import study as page
 
 # %%
 study = load_results(f"{results}/failures")
@@ -41,6 +43,9 @@ html.make_answer(operations.failures_sentence(study))
 
 # %%
 html.lead_figure(*lead)
+
+# %%
+page.make_panel_of(study, PRODUCT)
 
 # %% [markdown]
 # ## Why

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [pads]
+#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -25,6 +26,7 @@ from dess.analysis.answers import operations
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
 from dess.reports.pages import html
+from dess.reports.pages import study as page
 
 # %%
 study = load_results(f"{results}/pads")
@@ -38,6 +40,9 @@ html.make_answer(operations.enough_pads_sentence(study, margin))
 
 # %%
 html.lead_figure(*drawn[PRODUCT])
+
+# %%
+page.make_panel_of(study, PRODUCT)
 
 # %% [markdown]
 # ## Why

@@ -11,7 +11,14 @@ from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.settings.sobol import sobol_indices
-from dess.analysis.metrics import METRICS, PRODUCT, RATIO
+from dess.analysis.metrics import (
+    METRICS,
+    PRODUCT,
+    RATIO,
+    RECORDED,
+    check_metric,
+    check_ranking_metric,
+)
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.verdict import BEST, ONLY, SEEN_BEST, SEEN_WORSE, TIED, WORSE
@@ -121,6 +128,21 @@ def test_policies_are_compared_on_common_replications():
     results, means = stub(a=spread, b=spread[::-1])
     assert summary.add_verdicts(results, means)["verdict"].tolist() == [TIED] * 2
     assert summary.add_verdicts(results, means[1:])["verdict"].tolist() == [ONLY]
+
+
+@pytest.mark.parametrize("metric", ["pad_requests", "utilisation", "generated"])
+def test_what_is_neither_better_nor_worse_ranks_nothing(metric):
+    """No policy is the best by it, and no setting."""
+    spread = np.linspace(0.3, 0.8, 30)
+    results, means = stub(a=spread + 0.2, b=spread)
+    missions = results.missions.rename(columns={PRODUCT: metric})
+    results = SimpleNamespace(missions=missions, looks=results.looks)
+    means = means.assign(metric=metric)
+    assert summary.add_verdicts(results, means)["verdict"].tolist() == [ONLY] * 2
+    missions = {name: 0 for name in (*RECORDED, "pad_requests", "utilisation", "generated")}
+    check_metric(metric, missions)
+    with pytest.raises(InputError, match="neither better nor worse"):
+        check_ranking_metric(metric, missions)
 
 
 def test_an_allowance_for_failures_is_said_with_both_intervals():

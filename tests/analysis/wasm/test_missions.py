@@ -124,11 +124,22 @@ def test_missions_leave_no_memory_behind():
     assert engine.memory_size() == size
 
 
-@pytest.mark.parametrize("fleet", [[], [{"price": 1234.5}, {}]])
-def test_metrics_costs_and_sums_are_those_of_the_records(fleet):
+PRICES: dict[str, Any] = {
+    **{"uav": 1000.0, "pad": 300.0, "charge": 0.4, "hour": 7.0, "lost_uav": 900.0},
+    "slot_seconds": 12.0,
+}
+PLANS: dict[str, dict[str, Any]] = {
+    "of a number of missions": {"missions": 3},
+    "of a year": {"years": 5, "interest": 0.04, "days": 250, "pack": 350.0},
+    "of a year without interest": {"years": 3, "days": 12, "pack_cycles": 150.0},
+}
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("fleet", [[], [{"price": 1234.5, "flying_time": 60}, {}]])
+def test_metrics_costs_and_sums_are_those_of_the_records(fleet, plan):
     space = load_scenario("paper", **FAILURES, fleet=fleet)
-    costs = Costs(uav=1000.0, pad=300.0, charge=0.4, hour=7.0, lost_uav=900.0, missions=3,
-                  slot_seconds=12.0)  # fmt: skip
+    costs = Costs(**PRICES, **PLANS[plan])
     engine = Engine(image.make_image(space, ["greedy"], 7, 30, costs=costs))
     engine.call("play", 0.0, 30)
     engine.call("measure", 30)
@@ -140,10 +151,7 @@ def test_metrics_costs_and_sums_are_those_of_the_records(fleet):
         assert values[name].tolist() == records.missions[name].tolist()
     for name in records.operations.dtype.names or ():
         np.testing.assert_array_equal(values[name], records.operations[name])
-    columns = {name: records.missions[name] for name in ("uavs", "slots")}
-    flown = np.arange(records.uavs.shape[1]) < columns["uavs"][:, None]
-    uavs = {name: records.uavs[name][flown] for name in ("charged", "down")}
-    parts = costs.parts([space], columns | {"point": np.zeros(30, int)}, uavs)
+    parts = parts_of(costs, space, records)
     assert values["cost"].tolist() == sum(parts.values()).tolist()
     totals = dict(zip(entry.METRICS, engine.read("totals"), strict=True))
     for name, column in values.items():
@@ -152,6 +160,36 @@ def test_metrics_costs_and_sums_are_those_of_the_records(fleet):
         ends = [min(measured), max(measured)] if measured else [0.0, 0.0]
         expected = [len(measured), _sum(measured), _sum(squares), *ends]
         assert totals[name].tolist() == expected
+
+
+def parts_of(costs: Costs, space: ScenarioSpace, records: Records) -> dict[str, np.ndarray]:
+    """The parts of the cost of missions, as Python computes them."""
+    columns = {name: records.missions[name] for name in ("uavs", "slots", "flying_time")}
+    columns["point"] = np.zeros(len(records.missions), int)
+    flown = np.arange(records.uavs.shape[1]) < columns["uavs"][:, None]
+    uavs = {name: records.uavs[name][flown] for name in ("charged", "down", "battery")}
+    return costs.parts([space], columns, uavs)
+
+
+def test_a_year_of_a_sheet_pays_for_the_packs_of_each_type():
+    """A pack wears by the full battery of its own type, and all pads are paid for."""
+    types = [{"endurance": "20 min", "price": 900.0}, {}]
+    space = load_scenario("jade-bight", uavs=2, fleet=types)
+    costs = Costs(uav=1000.0, pad=300.0, charge=2.0, years=5, days=250, pack=350.0)
+    settings = {"pads": [1, 2], "zones.pads": [1, 2], "data_sheet.wind": ["4 m/s from SW"]}
+    made = image.make_image(space, ["greedy"], 7, 5, settings, costs)
+    engine = Engine(made)
+    for slider in made.sliders:
+        slider.apply(made.arrays, slider.values[-1])
+    engine.lay_out(made)
+    engine.call("play", 0.0, 5)
+    engine.call("measure", 5)
+    changed = ScenarioSpace.of(space, **{name: values[-1] for name, values in settings.items()})
+    records = simulate_batch(changed, [policies.load("greedy")], 7, 5)
+    assert_same_records(engine.records(), records)
+    parts = parts_of(costs, changed, records)
+    assert parts["packs"].min() > 0
+    assert engine.read("values")[:, -1].tolist() == sum(parts.values()).tolist()
 
 
 def test_intervals_of_means_and_differences_are_the_confidence_sequences():
