@@ -215,6 +215,17 @@ def spellings(unit: str) -> Iterator[tuple[str, ...]]:
     yield from UNITS[unit]
 
 
+def unit_of(text: str, units: str) -> str:
+    """The unit of a quantity in its first spelling: of ``90 minutes`` it is ``min``.
+
+    Raises:
+        InputError: If it has no unit, or one of another kind.
+    """
+    measured(text, units)
+    name = _split(text)[1].split(" ")[0]
+    return next((names[0] for names in UNITS[units] if name in names), name)
+
+
 def times(text: str, factor: float) -> str:
     """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
     number, rest = _split(text)
