@@ -216,14 +216,13 @@ def spellings(unit: str) -> Iterator[tuple[str, ...]]:
 
 
 def unit_of(text: str, units: str) -> str:
-    """The unit of a quantity in its first spelling: of ``90 minutes`` it is ``min``.
+    """The unit of a quantity, or of the first of two, as it was typed.
 
     Raises:
         InputError: If it has no unit, or one of another kind.
     """
     measured(text, units)
-    name = _split(text)[1].split(" ")[0]
-    return next((names[0] for names in UNITS[units] if name in names), name)
+    return re.split(" from | at ", _split(text)[1])[0]
 
 
 def times(text: str, factor: float) -> str:

@@ -471,3 +471,9 @@ def test_ten_lines_say_what_is_assumed(searched):
     assert len(lines) == 10
     assert lines[1].startswith("A slot is 21 s, a hundredth of the endurance of 35 min")
     assert lines[2].startswith("A cell is 315 m wide, the way of a slot at 15 m/s.")
+
+
+def test_a_limit_is_told_in_the_unit_of_the_sheet():
+    speed, unit = limits._in_unit_of("10 kt from SW", 8.0, "m/s from deg")
+    assert unit == "kt" and speed == pytest.approx(8 * 3600 / 1852)
+    assert limits._in_unit_of("30 d", 86_400.0, "s") == (1, "d")

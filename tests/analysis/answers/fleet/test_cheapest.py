@@ -202,11 +202,11 @@ def test_an_answer_says_that_a_second_platform_is_not_needed(tmp_path):
     found = searched_sea(tmp_path, ["greedy"], {"success": 0.5}, values)
     priced = priced_settings(found).set_index("fleet")[COST]
     assert priced.to_dict() == {
-        "2 UAVs, 1 pad in zone 1 and no zone 2": 2100,
-        "2 UAVs, 1 pad in zone 1 and 1 pad in zone 2": 2200,
+        "2 UAVs, 6 pads in zone 1 and no zone 2": 2600,
+        "2 UAVs, 6 pads in zone 1 and 1 pad in zone 2": 2700,
     }
     best = search_of(found).best
-    assert best.fleet == "2 UAVs, 1 pad in zone 1 and no zone 2" and best.cost == 2100
+    assert best.fleet == "2 UAVs, 6 pads in zone 1 and no zone 2" and best.cost == 2600
     assert not found.scenario(best.points[0]).zones
 
 
@@ -263,6 +263,7 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     (text,) = search_of(found).reason_sentences()
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
-    undecided = "whether **3 UAVs and 1 pad** with the policy `random` meets the requirements"
-    assert f"The budget of 40 missions ended before it was decided {undecided}" in text
+    pair = "**1–3 UAVs, 1 pad in zone 1 and 1 pad in zone 2** with the policy `random`"
+    undecided = f"before it was decided whether {pair} meets the requirements; about "
+    assert f"The budget of 40 missions ended {undecided}" in text
     assert " missions would settle it." in text
