@@ -12,7 +12,7 @@ from dess.analysis import numbers
 from dess.base.errors import InputError, unknown_name
 from dess.model.record import MISSION_RECORD, measures_of
 from dess.scenario.data_sheet import Units
-from dess.scenario.quantities import printed
+from dess.scenario.quantities import measured, printed
 from dess.scenario.scenario import ScenarioSpace
 
 Kind = Literal["outcome", "share", "number", "cost"]
@@ -49,6 +49,8 @@ class Metric:
             length are to be compared by it.
         among: Of how many nodes it is that of the worst one; 1 if it is not of a node. Intervals
             and tests hold for so many at once (``level_of_each``).
+        told_unit: The unit in which a time is told that somebody has asked for in it, such as
+            ``min``; empty for ``unit``. Its columns stay in ``unit``.
     """
 
     column: str
@@ -67,6 +69,7 @@ class Metric:
     fails: bool = True
     grows: bool = False
     among: int = 1
+    told_unit: str = ""
 
     def level_of_each(self, level: Any) -> Any:
         """The level of the interval of each node so that those of all hold together at a level.
@@ -110,7 +113,15 @@ class Metric:
     @property
     def label(self) -> str:
         """The name with its unit."""
-        return f"{self.name} [{self.unit}]".removesuffix(" []")
+        return f"{self.name} [{self.told_unit or self.unit}]".removesuffix(" []")
+
+    @property
+    def scale(self) -> float:
+        """What a value of its column is multiplied by to be told."""
+        if self.told_unit:
+            size = measured(f"1 {self.told_unit}", "s")[0]
+            return _UNITS[self.unit][1] / size
+        return 1.0
 
     @property
     def within(self) -> str:
@@ -165,6 +176,8 @@ class Metric:
         """Writes a value that somebody asks for, with its unit."""
         if self.in_percent:
             return numbers.format_level
+        if self.is_in_sheet_unit:
+            return self.write
         return lambda value: f"{numbers.format_quantity(value)} {self.unit}".rstrip()
 
     @property
@@ -176,7 +189,8 @@ class Metric:
 
     def _with_unit(self, write: Callable[..., str]) -> Callable[..., str]:
         if self.is_in_sheet_unit:
-            return lambda *ends: f"{write(*ends)} {self.unit}"
+            unit = self.told_unit or self.unit
+            return lambda *ends: f"{write(*(self.scale * end for end in ends))} {unit}"
         return write
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from dess.analysis import numbers
 from dess.base.descriptions import Description, description_of
@@ -78,7 +79,7 @@ class Field:
             maps = [*dict.fromkeys(map(str, values))]
             return [f"{len(v)} cells (map {maps.index(str(v)) + 1})" for v in values]
         if self.key == ZONE_PADS:
-            return [*map(_sum_in_words, values)]
+            return [*map(sum_in_words, values)]
         if self.key == "zone":
             return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
         plain = [*map(_single_item, values)]
@@ -88,7 +89,7 @@ class Field:
         return plain
 
 
-def _sum_in_words(value: Any) -> Any:
+def sum_in_words(value: Any) -> Any:
     """Several numbers as ``2 + 3``; one number as it is."""
     if isinstance(value, list | tuple):
         return " + ".join(map(str, value))
@@ -247,13 +248,15 @@ def field_in_words(space: ScenarioSpace, field: str) -> str:
         return numbers.format_span(value, "{:g}")
     if field == "nodes":
         return f"{len(value)} cells"
-    if isinstance(value, bool):
-        return numbers.format_truth(value)
-    if isinstance(value, float):
-        return f"{value:g}"
-    if value is None:
-        return "none"
-    return str(value).strip("()")
+    if field == ZONE_PADS:
+        return str(sum_in_words(value)) or "0"
+    plain = TypeAdapter(Any).dump_python(value, mode="json")
+    if isinstance(plain, list):
+        return ", ".join(map(value_text, plain)) or "none"
+    is_count = isinstance(plain, int) and not isinstance(plain, bool)
+    if is_count:
+        return str(plain)
+    return value_text(plain)
 
 
 def value_of_field(space: ScenarioSpace, field: str) -> Any:

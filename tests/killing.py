@@ -25,7 +25,7 @@ MARK = "DESS_TEST_COMMAND"  # a variable by which the processes of a command are
 SECONDS = 300.0  # in which a command makes progress, ends, and is followed by its processes
 # What a command prints on stderr beside the line for an error.
 PROGRESS = re.compile(
-    r"\s*|compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|"
+    r"\s*|compiling the simulator .*|(at least )?[\d,]+ missions(, [\d,]+ of them present)?|"
     r"replay memory: .*|on this machine: .*|curves: .*|a live view of the curves .*|.*\[\d\d:\d\d.*"
 )
 

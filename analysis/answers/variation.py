@@ -34,7 +34,7 @@ from dess.analysis.metrics import (
     measured_in,
     metric_of,
 )
-from dess.analysis.names import RANGES, described_field, field_in_words, field_named
+from dess.analysis.names import RANGES, described_field, field_in_words, field_named, sum_in_words
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
@@ -51,6 +51,7 @@ from dess.analysis.stats.verdict import (
     judge_difference,
 )
 from dess.analysis.tables import Table
+from dess.scenario.fields import ZONE_PADS
 
 if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
@@ -427,12 +428,22 @@ class Variation:
 
     def _fields(self, names: Iterable[str]) -> pd.DataFrame:
         """Fields of the scenario in the baseline and in the variation, as a table to print."""
-        sides = [self.results.scenario(point) for point in (BASELINE, VARIATION)]
         rows = [
-            (name, described_field(name).brief, *(field_in_words(side, name) for side in sides))
+            (
+                name,
+                described_field(name).brief,
+                *(self._value_in_words(side, name) for side in (BASELINE, VARIATION)),
+            )
             for name in names
         ]
         return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])
+
+    def _value_in_words(self, side: int, field: str) -> str:
+        """The value of a field on one side; also of a zone that 0 pads leave out."""
+        given = self.results.store.manifest.points[side].values.get(field)
+        if field == ZONE_PADS and given is not None:
+            return str(sum_in_words(given))
+        return field_in_words(self.results.scenario(side), field)
 
     def field_table(self) -> pd.DataFrame:
         """The fields that the variation changes, that both sides set and that missions draw."""

@@ -22,9 +22,15 @@ from dess.analysis.answers.fleet.requirements import (
     least_spare,
     requirements_of,
 )
-from dess.analysis.answers.settings.points import fleets_in_words, pads_in_words
+from dess.analysis.answers.fleet.verdicts import judge_settings
+from dess.analysis.answers.settings.points import (
+    conditions_in_words,
+    fleets_in_words,
+    has_conditions,
+    pads_in_words,
+)
 from dess.analysis.ask.question import FIRST, LONGEST, Question
-from dess.analysis.metrics import COST, metric_of
+from dess.analysis.metrics import COST
 from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
@@ -113,22 +119,28 @@ def table_around(results: Results) -> Table:
     start, *rows = [point.values for point in changed_results.store.manifest.points]
     changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
     space = changed_results.scenario(0)
+    of_search = _verdicts_of_search(results)
     words = ["the fleet", *(_in_words(space, change) for change in changes)]
     refused = [change for change in _changed_fields(space) if change not in changes]
     data = priced_settings(changed_results)
+    scenarios = [changed_results.scenario(point) for point in data["point"]]
     data = data.assign(
         change=[words[point] for point in data["point"]],
         lead=least_spare(data, requirements),
-        verdict=[_verdict_on_row(row, requirements) for _, row in data.iterrows()],
+        verdict=[
+            of_search.get(scenario) or _verdict_on_row(row, requirements)
+            for scenario, (_, row) in zip(scenarios, data.iterrows(), strict=True)
+        ],
     )
     data = data.iloc[np.lexsort((data["lead"], data["point"] > 0))].reset_index(drop=True)
-    columns = [requirement.column for requirement in requirements]
-    cells = setting_cells(data.assign(condition="", fleet=data["change"]), columns)
+    metrics = [requirement.metric for requirement in requirements]
+    columns = [metric.column for metric in metrics]
+    cells = setting_cells(data.assign(condition="", fleet=data["change"]), metrics)
     cells = cells.drop(columns="Policy").rename(columns={"Fleet": "What if"})
     cells = cells.rename(columns={"Cost": f"Cost [{results.prices.unit}]"})
     differences = compare(changed_results.missions, 0, columns, correction=None, of="point")
     differences = differences.set_index(["metric", "point"])[["difference", "low", "high"]]
-    for metric in map(metric_of, columns):
+    for metric in metrics:
         of_changes = differences.loc[metric.column].loc[data["point"][1:]].to_numpy()
         means = data[metric.column][1:]
         cells.loc[1:, metric.name] = [
@@ -137,9 +149,13 @@ def table_around(results: Results) -> Table:
         ]
     cells.insert(1, "Requirements", data["verdict"].astype(str))
     fleet = fleets_in_words(changed_results)[0]
+    if has_conditions(results):
+        condition = conditions_in_words(results)[search_of(results).best.points[-1]]
+        fleet += f" under {condition}"
     caption = (
         f"The fleet of {fleet}, and one more of it: means, and in brackets changes on the same "
-        f"{data['n'][0]:,} missions, with {INTERVALS}; requirements are met or missed if the whole "
+        f"{data['n'][0]:,} missions, with {INTERVALS}. Whether requirements are met is what the "
+        "search has shown; of a fleet that it did not have, they are met or missed if the whole "
         "interval of each mean says so, otherwise open"
     )
     if refused:
@@ -177,6 +193,16 @@ def one_more_sentence(results: Results) -> str:
     )
 
 
+def _verdicts_of_search(results: Results) -> dict[ScenarioSpace, Verdict]:
+    """What the search for the cheapest fleet has shown of every scenario, with its policy."""
+    rows = judge_settings(results)
+    rows = rows[rows["policy"] == search_of(results).best.policy]
+    return {
+        results.scenario(point): Verdict(verdict)
+        for point, verdict in zip(rows["point"], rows["verdict"], strict=True)
+    }
+
+
 def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
     """Whether the intervals of a row keep all requirements."""
     verdicts = [
@@ -189,5 +215,5 @@ def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verd
 def _in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
     if field == "pads":
-        return pads_in_words(space, 1, value)
+        return pads_in_words(len(space.zone_pads), 1, value)
     return field_named(field).words(value)

@@ -34,7 +34,7 @@ from dess.base.files.documents import Document
 from dess.base.files.writing import write_file
 from dess.model.record import Records
 from dess.policies.registry import is_path, load_team
-from dess.scenario.quantities import POINTS, measured, rounded, times
+from dess.scenario.quantities import POINTS, measured, rounded, times, unit_of
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
 MISSIONS = 30  # of the check, at most; for failures three times as many
@@ -502,7 +502,8 @@ def _find_strongest_wind(fleet: _Fleet) -> Limit:
     digits = _digits_of_limit(trials, search.broken)
     last = ""
     if search.low > 0:
-        last = rounded(f"{search.low:g} m/s from {worst}", digits)
+        speed_in_unit, unit = _in_unit_of(sheet.wind or "1 m/s from N", search.low, "m/s from deg")
+        last = rounded(f"{speed_in_unit:.12g} {unit} from {worst}", digits)
     harder = 0.0
     if sheet.wind:
         present, _ = measured(sheet.wind, "m/s from deg")
@@ -559,7 +560,8 @@ def _find_most_failures(fleet: _Fleet) -> Limit:
             limit = math.exp(exponent)
             broken = trial(model, 1.001 * limit).broken
             digits = _digits_of_rate(model, broken, limit)
-        last = rounded(f"{1 / limit:.6g} h", digits, is_up=True)
+        mean_time, unit = _in_unit_of(sheet.mtbf or "1 h", 3600 / limit, "s")
+        last = rounded(f"{mean_time:.6g} {unit}", digits, is_up=True)
         if sheet.mtbf:
             last = min(last, sheet.mtbf, key=_seconds)
     harder = 0.0
@@ -587,6 +589,19 @@ def _digits_of_rate(model: FailureModel, broken: str, rate: float) -> int:
     if error <= 2 * CLOSE * abs(slope):
         return 2
     return 1
+
+
+def _in_unit_of(text: str, value: float, units: str) -> tuple[float, str]:
+    """A value in the unit in which a quantity was typed, and this unit.
+
+    Args:
+        text: The quantity.
+        value: The value in the first unit of ``units``.
+        units: What the quantity is measured in, of ``quantities.KINDS``.
+    """
+    unit = unit_of(text, units)
+    size = measured(f"1 {unit}", units.split(" ")[0])[0]
+    return value / size, unit
 
 
 def _seconds(time: str) -> float:

@@ -48,12 +48,14 @@ class Round(NamedTuple):
         missions: Number of missions, event logs and bounds needed up to this round.
         present: Number of those of this round that are already in the folder.
         work: What is made in place of missions: ``event logs``, or ``bounds`` in the last round.
+        may_need_more: Whether a rule may ask for more missions after this round.
     """
 
     number: int
     missions: int
     present: int
     work: str = ""
+    may_need_more: bool = False
 
 
 class ChunkError(Exception):
@@ -230,7 +232,8 @@ class _Run:
         """Tell that a round begins, of how many missions, and how many of them are present."""
         self.asked += count
         if self.announce:
-            self.announce(Round(self.rounds, self.asked, present, work))
+            may_need_more = self.study.rule is not None
+            self.announce(Round(self.rounds, self.asked, present, work, may_need_more))
         self.rounds += not work
         if self.progress:
             self.progress(present)

@@ -77,7 +77,8 @@ class Zone(Strict):
         None,
         ge=1,
         description=Description(
-            "charging pads of a further zone", note="without it, as many as the zone has cells"
+            "charging pads of a further zone",
+            note="without it, as many as the zone has cells; a zone with 0 is left out",
         ),
     )
 
@@ -436,13 +437,21 @@ _EACH = {
     "failures.pad_rate": "failures.pad_rates",
     "failures.pad_repair": "failures.pad_repairs",
 }
+# What may be listed for each zone, the start zone first.
+_OF_EACH_ZONE = (
+    "failures.pad_rates",
+    "failures.pad_repairs",
+    "data_sheet.pad_mtbf",
+    "data_sheet.pad_repair",
+)
 
 
 def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section.
 
     ``zones.pads`` replaces the pads of the further zones: a number for all, or one for each. A rate
-    or an amount for all nodes replaces those of each.
+    or an amount for all nodes replaces those of each. A further zone with 0 pads is left out, with
+    what is listed for it: its platform is not there.
 
     Raises:
         InputError: If ``zones.pads`` has another length than ``zones``.
@@ -475,7 +484,32 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         result["zones"] = [
             {**zone, "pads": n} for zone, n in zip(zones, pads_of_zones, strict=True)
         ]
+    _leave_out_zones_without_pads(result)
     return result
+
+
+def _leave_out_zones_without_pads(values: dict[str, Any]) -> None:
+    """Take the further zones with 0 pads out of the values of a scenario."""
+    zones = values.get("zones") or ()
+    if not isinstance(zones, list | tuple):
+        return
+    kept = [number for number, zone in enumerate(zones) if not _has_no_pads(zone)]
+    if len(kept) == len(zones):
+        return
+    values["zones"] = [zones[number] for number in kept]
+    for field in _OF_EACH_ZONE:
+        section, _, name = field.partition(".")
+        of_section = values.get(section, {})
+        of_zones = of_section.get(name)
+        if isinstance(of_zones, list | tuple) and len(of_zones) == 1 + len(zones):
+            first, *others = of_zones
+            of_section[name] = [first, *(others[number] for number in kept)]
+
+
+def _has_no_pads(zone: Any) -> bool:
+    """Whether a further zone is a table with 0 pads."""
+    pads = zone.get("pads") if isinstance(zone, dict) else None
+    return isinstance(pads, int) and is_number(pads) and pads == 0
 
 
 def dotted(values: dict[str, Any]) -> dict[str, Any]:

@@ -215,6 +215,16 @@ def spellings(unit: str) -> Iterator[tuple[str, ...]]:
     yield from UNITS[unit]
 
 
+def unit_of(text: str, units: str) -> str:
+    """The unit of a quantity, or of the first of two, as it was typed.
+
+    Raises:
+        InputError: If it has no unit, or one of another kind.
+    """
+    measured(text, units)
+    return re.split(" from | at ", _split(text)[1])[0]
+
+
 def times(text: str, factor: float) -> str:
     """A quantity, or the first of two, times a factor: ``5 m/s from SW`` as ``10 m/s from SW``."""
     number, rest = _split(text)

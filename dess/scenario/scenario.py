@@ -147,7 +147,7 @@ class Constants(Fields):
         between = {
             "uavs": (1, min(self.zone_cells, MOST_UAVS)),
             "pads": (1, self.zone_cells),
-            ZONE_PADS: (1, min((w * h for *_, w, h in self.rectangles[1:]), default=1)),
+            ZONE_PADS: (0, min((w * h for *_, w, h in self.rectangles[1:]), default=1)),
             "initial_data": (0, MOST_DATA),
         }
         limits = fields_of(Scenario)[field].metadata
@@ -265,7 +265,7 @@ def parsed_scenario(text: str, path: Path, context: str = "") -> ScenarioSpace:
 def _load(
     name_or_path: str | Path, overrides: dict[str, Any], context: str = "", found: Any = None
 ) -> ScenarioSpace:
-    has_sheet = any(name.partition(".")[0] == "data_sheet" for name in overrides)
+    has_sheet = any(field.partition(".")[0] == "data_sheet" for field in dotted(overrides))
     where, read = found or _read(name_or_path, has_sheet)
     with notes_after():
         return _of_values(name_or_path, where, read, overrides, context)

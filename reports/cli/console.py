@@ -388,6 +388,8 @@ def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
                 shown.set_description(f"round {started.number + 1}", refresh=False)
             else:
                 line = format_count(started.missions, "mission")
+                if started.may_need_more:
+                    line = f"at least {line}"
                 if started.present:
                     line += f", {started.present:,} of them present"
                 print_text(line, sys.stderr)

@@ -1,5 +1,6 @@
 """What is told in units with a data sheet is what the model has in slots and data units."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from dess.analysis import tables
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts
+from dess.analysis.answers.fleet.requirements import metric_asked_for
 from dess.analysis.answers.fleet.risk import risk_sentence
 from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, charging_slots, rule_of_thumb
 from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
@@ -100,7 +102,8 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
     ends = f"[{row['cost_low']:,.0f}, {row['cost_high']:,.0f}]"
     cost = f"for {best.cost:,.0f} EUR a year {ends}"
     assert f"{cost}: {parts['purchase']:,.0f} EUR for the purchase" in text
-    assert f"(battery packs {parts['packs']:,.0f} EUR and hours {parts['hours']:,.0f} EUR)" in text
+    of_missions = f"(battery packs {parts['packs']:,.0f} EUR, hours {parts['hours']:,.0f} EUR"
+    assert f"{of_missions} and lost UAVs 0 EUR)" in text
     assert "for 200 missions (" in text
     assert f"{best.cost / gb:,.0f} EUR per GB collected" in text
     assert f"; to buy it costs {2 * parts['purchase']:,.0f} EUR." in text
@@ -193,9 +196,10 @@ def test_an_age_is_required_to_be_at_most(column, age, verdict):
 
 def test_the_answer_has_every_requirement_in_its_unit(searched):
     text = " ".join(search_of(searched).sentences())
-    assert " h (at most 0.8333 h required)" in text
+    assert " min (at most 50 min required)" in text
     # Half a percent of two hours more.
-    assert "its age of information is at most 0.8433 h" in text
+    assert "its age of information is at most 50.6 min" in text
+    assert not re.search(r"\d h\b", text)
     # A mission with a sheet ends on the ground.
     assert "way home" not in text
 
@@ -241,23 +245,31 @@ def test_the_fleet_is_asked_about_with_one_more(searched):
     assert "Cannot be simulated" not in caption
     assert cells["What if"][0] == "the fleet"
     assert caption.startswith("The fleet of 1 UAV")
+    search = search_of(searched).best.fleets.set_index("fleet")["verdict"]
     for row in data.itertuples():
         is_met = row.success_low >= 0.6 and row.collection_ratio_low >= 0.3
-        assert (row.verdict == "met") == (is_met and row.age_h_high <= 50 / 60)
+        verdict = search.get(row.fleet)
+        if verdict is None:
+            assert (row.verdict == "met") == (is_met and row.age_h_high <= 50 / 60)
+        else:
+            assert row.verdict == verdict
+    assert data["verdict"][0] == "met"
+    assert all(text.endswith(" min)") for text in cells["Age of information"][1:])
     assert data["point"][0] == 0
     for metric in ("success", "age_h"):
         means = found.missions.groupby("point")[metric].mean()[data["point"]].to_numpy()
-        told = [metric_of(metric).change(mean - means[0], 0, 0).split()[0] for mean in means[1:]]
-        column = metric_of(metric).name
+        measure = metric_asked_for(searched, metric)
+        told = [measure.change(mean - means[0], 0, 0).split()[0] for mean in means[1:]]
+        column = measure.name
         assert [text.split("(")[1].split()[0] for text in cells[column][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
     # One more UAV, in a sentence of the answer.
-    spare = data["change"].tolist().index(f"{first['uavs'] + 1} UAVs")
-    more = data["cost"][spare] - data["cost"][0]
+    more_uavs = data["change"].tolist().index(f"{first['uavs'] + 1} UAVs")
+    more = data["cost"][more_uavs] - data["cost"][0]
     text = around.one_more_sentence(searched)
     assert text.startswith(f"One more UAV, which flies all day, costs {more:,.0f} EUR more; ")
     tightest = search_of(searched).best.tightest_first[0].metric
-    change = cells[tightest.name][spare].split("(")[1].rstrip(")")
+    change = cells[tightest.name][more_uavs].split("(")[1].rstrip(")")
     assert change in text
 
 
@@ -459,3 +471,9 @@ def test_ten_lines_say_what_is_assumed(searched):
     assert len(lines) == 10
     assert lines[1].startswith("A slot is 21 s, a hundredth of the endurance of 35 min")
     assert lines[2].startswith("A cell is 315 m wide, the way of a slot at 15 m/s.")
+
+
+def test_a_limit_is_told_in_the_unit_of_the_sheet():
+    speed, unit = limits._in_unit_of("10 kt from SW", 8.0, "m/s from deg")
+    assert unit == "kt" and speed == pytest.approx(8 * 3600 / 1852)
+    assert limits._in_unit_of("30 d", 86_400.0, "s") == (1, "d")

@@ -31,7 +31,7 @@ _BIDI = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}
 _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach a terminal
 # Lines on standard error that say what a command does, and no error.
 _NEWS = re.compile(
-    r"compiling the simulator .*|[\d,]+ missions?(, [\d,]+ of them present)?"
+    r"compiling the simulator .*|(at least )?[\d,]+ missions?(, [\d,]+ of them present)?"
     r"|.*\[\d+:[\d:]+[<,] ?.*\]|on this machine: .* to go|replay memory: .*|curves: tensorboard .*"
     r"|.*: this training is not finished .*"
 )

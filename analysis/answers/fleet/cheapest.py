@@ -27,6 +27,7 @@ from dess.analysis.answers.fleet.requirements import (
     Requirement,
     Verdict,
     least_spare,
+    metric_asked_for,
     relative_spare,
     requirements_of,
 )
@@ -242,7 +243,7 @@ class FleetAnswer:
     def _measured(self, column: str) -> str:
         """The mean of a metric of the fleet and its interval, in words."""
         row = self.estimates(column)
-        return metric_of(column).written(*row[interval_columns(column)])
+        return metric_asked_for(self.results, column).written(*row[interval_columns(column)])
 
     def home_sentence(self) -> str:
         """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
@@ -283,20 +284,43 @@ class FleetAnswer:
         ).strip()
 
     def budget_sentence(self) -> str:
-        """Whether the budget ended before the answer was sure, and what would settle it."""
+        """Which pair the budget left undecided, and about how many missions would settle it."""
         choice = self._choice
         rule = self.results.study.selection
         if not choice.done or self._answer.settled:
             return ""
         assert isinstance(rule, Cheapest)
         if choice.enough:
-            enough = f"about {float(f'{choice.enough:.2g}'):,.0f}"
+            enough = f"about {float(f'{choice.enough:.2g}'):,.0f} missions"
         else:
             enough = "far more"
         return (
-            f"The budget of {rule.budget:,} missions ended before this was decided; {enough} would "
-            "settle it."
+            f"The budget of {rule.budget:,} missions ended before it was decided whether "
+            f"{self._undecided_in_words()}; {enough} would settle it."
         )
+
+    def _undecided_in_words(self) -> str:
+        """The pair of a fleet and the policy that may change the answer, and how many others may.
+
+        It is the cheapest of those that are left beside the answer; without an answer, the one that
+        is the closest to the requirements.
+        """
+        left = {*self._answer.left} - {self.points}
+        firsts = [points[0] for points in left]
+        words = fleets_in_words(self.results)
+        rows = self.fleets[self.fleets["fleet"].isin([words[point] for point in firsts])]
+        if self.points:
+            row = rows.sort_values(COST, kind="stable").iloc[0]
+        else:
+            row = rows.loc[least_spare(rows, self._required).idxmax()]
+        if row["verdict"] == Verdict.MET:
+            what = "costs less"
+        else:
+            what = "meets the requirements"
+        text = f"**{row['fleet']}** with the policy `{self.policy}` {what}"
+        if len(left) > 1:
+            text += f" ({numbers.format_count(len(left) - 1, 'other fleet')} may change it too)"
+        return text
 
     def cheaper_sentence(self) -> str:
         """The next cheaper fleet and why it is not the answer; without an answer, the closest."""
@@ -546,8 +570,9 @@ def _ends_of_values(results: Results, point: int) -> dict[str, str]:
     cheapest_uav = min(prices.prices_of_uavs(space, max(len(space.fleet), 1)))
     price_of = {"uavs": cheapest_uav, "pads": prices.pad, ZONE_PADS: prices.pad * len(space.zones)}
     price_of = {field: price for field, price in price_of.items() if field in table}
+    fewest = {ZONE_PADS: 0}  # of others one
     spent = {
-        field: price * (table[field][point] - 1)
+        field: price * (table[field][point] - fewest.get(field, 1))
         for field, price in price_of.items()
         if is_numeric_dtype(table[field])
     }

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.fleet.requirements import metric_asked_for, requirements_of
 from dess.analysis.answers.settings.points import (
     conditions_in_words,
     fleets_in_words,
@@ -27,6 +27,7 @@ from dess.analysis.metrics import (
     METRICS,
     PRODUCT,
     SUCCESS,
+    Metric,
     column_in_sheet_unit,
     metric_of,
 )
@@ -245,7 +246,7 @@ def cost_fronts(results: Results) -> dict[str, pd.DataFrame]:
     return {metric: cost_front(results, metric) for metric in metrics}
 
 
-def setting_cells(rows: pd.DataFrame, metrics: Iterable[str]) -> pd.DataFrame:
+def setting_cells(rows: pd.DataFrame, metrics: Iterable[str | Metric]) -> pd.DataFrame:
     """Rows of ``priced_settings`` as text: condition, fleet, policy, cost and metrics."""
     columns = {}
     if rows["condition"].any():
@@ -262,7 +263,7 @@ def cost_front_table(results: Results) -> Table:
     first = next(iter(fronts.values()))
     shares = pd.DataFrame({metric: front["probability"] for metric, front in fronts.items()})
     top = first[(shares >= CERTAIN).any(axis=1)].head(MOST_ROWS)
-    shown = setting_cells(top, fronts)
+    shown = setting_cells(top, [metric_asked_for(results, metric) for metric in fronts])
     for metric in fronts:
         head = f"On the front of {metric_of(metric).within}"
         shown[head] = shares.loc[top.index, metric].map(numbers.format_percent)

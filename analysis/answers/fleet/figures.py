@@ -10,11 +10,17 @@ from matplotlib.ticker import LogLocator, NullLocator
 from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_fronts
-from dess.analysis.answers.fleet.requirements import Verdict, requirements_in_words, requirements_of
+from dess.analysis.answers.fleet.requirements import (
+    Verdict,
+    metric_asked_for,
+    requirements_in_words,
+    requirements_of,
+)
+from dess.analysis.answers.fleet.verdicts import interval_columns
 from dess.analysis.answers.settings.figures import counted_missions
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.style import plot_front
-from dess.analysis.metrics import COST, metric_of
+from dess.analysis.metrics import COST, Metric
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import INTERVALS
 
@@ -36,7 +42,7 @@ _MARKS = (
 
 
 def plot_costs(
-    table: pd.DataFrame, metric: str, currency: str, required: float | None = None
+    table: pd.DataFrame, measure: Metric, currency: str, required: float | None = None
 ) -> Figure:
     """Cost against a metric under one condition, with 95 % intervals and the front.
 
@@ -44,11 +50,14 @@ def plot_costs(
 
     Args:
         table: Rows of ``fleet.costs.cost_front``.
-        metric: The metric of the front.
+        measure: The metric of the front.
         currency: The currency of the costs.
         required: The required mean of the metric, drawn as a line.
     """
     looks = style.policy_colours(table["policy"])
+    metric = measure.column
+    ends = interval_columns(metric)
+    table = table.assign(**(table[ends] * measure.scale))
     best = table[table["on_front"]].sort_values(COST)
     with style.new_panels(4.1) as (figure, ax):
         if len(best) > 1:
@@ -77,7 +86,13 @@ def plot_costs(
                         va=side, ha="center", fontsize=8, xytext=(0, gap),
                         textcoords="offset points", **style.OUTLINED)  # fmt: skip
         if required is not None:
-            ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
+            ax.axhline(
+                required * measure.scale,
+                color=style.MUTED,
+                linestyle="--",
+                linewidth=1.1,
+                label="required",
+            )
         ax.margins(x=0.12, y=0.25)
         style.set_axis_unit(ax.xaxis, "", 5)
         if table[COST].max() > WIDE * table[COST].min() > 0:
@@ -85,7 +100,6 @@ def plot_costs(
             ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             ax.xaxis.set_minor_locator(NullLocator())
             ax.xaxis.set_major_formatter("{x:,g}")
-        measure = metric_of(metric)
         style.set_axis_unit(ax.yaxis, measure.axis)
         if measure.in_percent:
             ylabel = measure.within
@@ -127,8 +141,9 @@ def _draw_costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -
     condition = rows["condition"].iloc[0]
     bounds = {requirement.column: requirement.bound for requirement in requirements_of(results)}
     least = bounds.get(metric)
-    drawing = plot_costs(rows, metric, results.prices.unit, least)
-    alt = f"Cost against {metric_of(metric).within}"
+    measure = metric_asked_for(results, metric)
+    drawing = plot_costs(rows, measure, results.prices.unit, least)
+    alt = f"Cost against {measure.within}"
     if condition:
         alt += f", {condition}"
     counted = f"{INTERVALS}; n = {counted_missions(rows)} missions per setting."

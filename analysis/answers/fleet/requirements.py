@@ -8,7 +8,7 @@ information of at most 90 minutes.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -19,6 +19,7 @@ from dess.analysis import numbers
 from dess.analysis.metrics import Metric, column_in_sheet_unit, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
+from dess.scenario.quantities import unit_of
 
 
 class Verdict(StrEnum):
@@ -39,7 +40,8 @@ class Requirement:
     """A bound that the mean of a metric has to keep.
 
     Attributes:
-        metric: The metric, as the missions have it: with a data sheet in its unit.
+        metric: The metric, as the missions have it: with a data sheet in its unit. It is told in
+            the unit in which it was required.
         bound: The least mean, or the largest of a metric of which less is better.
     """
 
@@ -97,10 +99,20 @@ def requirements_of(results: Results) -> list[Requirement]:
     rule = results.study.selection
     if not isinstance(rule, Cheapest):
         return []
-    return [
-        Requirement(metric_of(column_in_sheet_unit(metric, results.missions)), rule.amount(metric))
-        for metric in rule.requirements
-    ]
+    requirements = []
+    for metric, required in rule.requirements.items():
+        of_missions = metric_of(column_in_sheet_unit(metric, results.missions))
+        if isinstance(required, str):
+            of_missions = replace(of_missions, told_unit=unit_of(required, "s"))
+        requirements.append(Requirement(of_missions, rule.amount(metric)))
+    return requirements
+
+
+def metric_asked_for(results: Results, column: str | Metric) -> Metric:
+    """The metric of a column, told in the unit of the requirement if there is one on it."""
+    asked = {requirement.column: requirement.metric for requirement in requirements_of(results)}
+    measure = metric_of(column)
+    return asked.get(measure.column, measure)
 
 
 def requirements_in_words(requirements: Sequence[Requirement]) -> str:

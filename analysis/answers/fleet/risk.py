@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.fleet.requirements import metric_asked_for, requirements_of
 from dess.analysis.metrics import AGE, RATIO, column_in_sheet_unit, metric_of
 from dess.analysis.results.tables import Results
 
@@ -46,7 +46,7 @@ def _worst_in_words(results: Results, missions: pd.DataFrame) -> str:
     age = column_in_sheet_unit(AGE, missions)
     asked = [requirement.column for requirement in requirements_of(results)]
     if age in asked:
-        oldest = metric_of(age).amount(missions[age].quantile(1 - _WORST))
+        oldest = metric_asked_for(results, age).amount(missions[age].quantile(1 - _WORST))
         return f"in the worst tenth of them, the data are {oldest} old or older"
     least = metric_of(RATIO).amount(missions[RATIO].quantile(_WORST))
     return f"in the worst tenth of them, at most {least} of the data are collected"

@@ -11,7 +11,11 @@ from dess.analysis.answers.fleet.costs import (
     setting_cells,
     yearly_parts,
 )
-from dess.analysis.answers.fleet.requirements import requirements_in_words, requirements_of
+from dess.analysis.answers.fleet.requirements import (
+    metric_asked_for,
+    requirements_in_words,
+    requirements_of,
+)
 from dess.analysis.answers.fleet.verdicts import (
     VERDICTS_EXPLAINED,
     checked_settings,
@@ -20,7 +24,7 @@ from dess.analysis.answers.fleet.verdicts import (
     reported_metrics,
 )
 from dess.analysis.answers.settings.points import has_conditions, intervals_in_words
-from dess.analysis.metrics import COST, SUCCESS, metric_of
+from dess.analysis.metrics import COST, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import INTERVALS, MOST_PRINTED, MOST_ROWS, Table, format_counts
 
@@ -76,7 +80,8 @@ def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) ->
         cells.insert(place + 1, "Missions' cost", rows["running"].map(format_amount))
     is_answer = rows["answer"] == "answer"
     cells["Requirements"] = rows["verdict"].where(~is_answer, rows["verdict"] + ": the answer")
-    for metric in map(metric_of, dict.fromkeys([*reported_metrics(results), further])):
+    further_metric = metric_asked_for(results, further)
+    for metric in dict.fromkeys([*reported_metrics(results), further_metric]):
         if metric.column != COST:
             cells[metric.name] = numbers.format_estimates(rows, metric.column, metric.written)
     return cells.assign(n=format_counts(rows["n"]))
@@ -135,7 +140,8 @@ def condition_table(results: Results) -> Table:
 def check_table(results: Results) -> Table:
     """The check of the selected fleets: all that is required, and the way home."""
     rows = checked_settings(results)
-    shown = setting_cells(rows, reported_metrics(results)).assign(n=format_counts(rows["n"]))
+    shown = setting_cells(rows, reported_metrics(results))
+    shown = shown.assign(n=format_counts(rows["n"]))
     caption = (
         "The check of the selected fleets on missions that had no part in the search: means with "
         f"{INTERVALS}"

@@ -10,9 +10,9 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.answers.fleet.costs import priced_settings
-from dess.analysis.answers.fleet.requirements import Verdict, requirements_of
+from dess.analysis.answers.fleet.requirements import Verdict, metric_asked_for, requirements_of
 from dess.analysis.answers.settings.home import with_way_home
-from dess.analysis.metrics import COST, SUCCESS, metric_of
+from dess.analysis.metrics import COST, SUCCESS, Metric
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.cheapest import CheapestChoice
 
@@ -68,13 +68,12 @@ def judge_fleets_everywhere(results: Results) -> pd.DataFrame:
 def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFrame) -> pd.Series:
     """The row of ``judge_fleets_everywhere`` of a fleet, of its rows under all conditions."""
     together = rows.iloc[0].copy()
-    for column in reported_metrics(results):
-        less = metric_of(column).less_is_better
-        if less:
-            worst = rows[column].idxmax()
+    for metric in reported_metrics(results):
+        if metric.less_is_better:
+            worst = rows[metric.column].idxmax()
         else:
-            worst = rows[column].idxmin()
-        ends_of = interval_columns(column)
+            worst = rows[metric.column].idxmin()
+        ends_of = interval_columns(metric.column)
         together[ends_of] = rows.loc[worst, ends_of]
     together[interval_columns(COST)] = rows[interval_columns(COST)].mean()
     together["condition"] = ALL_CONDITIONS
@@ -85,10 +84,11 @@ def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFram
     return together
 
 
-def reported_metrics(results: Results) -> list[str]:
+def reported_metrics(results: Results) -> list[Metric]:
     """What the tables and sentences of a search tell of a fleet: success, and what is required."""
     asked = [requirement.column for requirement in requirements_of(results)]
-    return with_way_home(results, [SUCCESS, *asked])
+    columns = with_way_home(results, [SUCCESS, *asked])
+    return [metric_asked_for(results, column) for column in columns]
 
 
 def interval_columns(column: str) -> list[str]:

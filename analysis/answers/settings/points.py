@@ -18,8 +18,7 @@ from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.prices import has_priced_types
 from dess.analysis.tables import INTERVALS
-from dess.scenario.fields import ZONE_PADS
-from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.fields import ZONE_PADS, is_number
 
 _COUNTED = ("uavs", "pads", ZONE_PADS)  # the numbers of what has a price
 
@@ -100,18 +99,37 @@ def fleets_in_words(results: Results) -> list[str]:
         if has_price or "uavs" in table:
             words.append(field_named("uavs").words(single_value([*space.uavs])))
         if prices.pad or {"pads", ZONE_PADS} & {*table}:
+            zone_pads = _zone_pads(results, point)
             words += [
-                pads_in_words(space, zone, pads) for zone, pads in enumerate(space.zone_pads, 1)
+                pads_in_words(len(zone_pads), zone, pads) for zone, pads in enumerate(zone_pads, 1)
             ]
         fleets.append(numbers.join_words([*words, *others]) or "the fleet of the scenario")
     return fleets
 
 
-def pads_in_words(space: ScenarioSpace, zone: int, pads: int) -> str:
-    """So many pads in zone 1, 2, ... in words; the zone is left out where there is no other."""
+def _zone_pads(results: Results, point: int) -> list[int]:
+    """The pads of each zone at a design point: 0 of a zone that is left out there."""
+    space = results.scenario(point)
+    manifest = results.store.manifest
+    asked = manifest.points[point].values.get(ZONE_PADS, space.zone_pads[1:])
+    if is_number(asked):
+        asked = [asked] * len(manifest.space({}).zones)
+    return [space.zone_pads[0], *asked]
+
+
+def pads_in_words(zones: int, zone: int, pads: int) -> str:
+    """So many pads in zone 1, 2, ... in words.
+
+    Args:
+        zones: The number of zones; of a single one, the zone is not named.
+        zone: The number of the zone, from 1.
+        pads: Its pads; a zone with 0 is not there.
+    """
     number = field_named("pads").words(pads)
-    if len(space.zone_pads) == 1:
+    if zones == 1:
         return number
+    if pads == 0:
+        return f"no zone {zone}"
     return f"{number} in zone {zone}"
 
 

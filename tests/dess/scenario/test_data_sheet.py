@@ -68,6 +68,9 @@ def test_pads_of_all_zones_or_of_each_fail():
     equal = ScenarioSpace.of(mixed, **{"data_sheet.pad_mtbf": "7 d"})
     assert equal.failures.pad_rate == pytest.approx(21 / (7 * 86400))
     assert not equal.failures.pad_rates
+    # Without the second zone, the pads of the first one fail as before.
+    alone = ScenarioSpace.of(mixed, **{"zones.pads": 0})
+    assert alone == _space({"pad_mtbf": ["90 d"], "pad_repair": "42 s"})
 
 
 def test_a_link_budget_gives_the_snr_of_friis_equation():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dess import InputError
-from dess.scenario.quantities import KINDS, UNITS, exactly, measured, times
+from dess.scenario.quantities import KINDS, UNITS, exactly, measured, times, unit_of
 from tests.test_docs import PAGES
 
 # What an engineer would look up.
@@ -36,6 +36,17 @@ SIZES = {
 @pytest.mark.parametrize(("text", "unit"), SIZES)
 def test_a_quantity_has_the_size_of_its_unit(text, unit):
     assert measured(text, unit) == pytest.approx((SIZES[text, unit],), rel=1e-15)
+
+
+def test_the_unit_is_told_as_it_was_typed():
+    typed = {
+        "90 min": "s",
+        "1.5h": "s",
+        "10 nautical miles": "m",
+        "36 km/h from SW": "m/s from deg",
+    }
+    units = [unit_of(text, kind) for text, kind in typed.items()]
+    assert units == ["min", "h", "nautical miles", "km/h"]
 
 
 def test_what_was_typed_is_kept_exactly():

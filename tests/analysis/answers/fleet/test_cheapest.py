@@ -189,11 +189,25 @@ def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(t
     first, other = search_of(found).reason_sentences()
     assert "With a probability of at least 95 %, its success is at least 50 % and " in first
     assert "With a probability of at least 97.5 %, its success is at least 50 % and " in other
-    assert "Of the values asked for, 2 UAVs is the least; a cheaper one may lie beyond." in first
+    ends = "2 UAVs is the least and pads of each further zone 1 is the least"
+    assert f"Of the values asked for, {ends}; a cheaper one may lie beyond." in first
     assert {*priced_settings(found)["cost"]} == {
         1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
     }
     assert "1 pad in zone 1 and 3 pads in zone 2" in "".join(priced_settings(found)["fleet"])
+
+
+def test_an_answer_says_that_a_second_platform_is_not_needed(tmp_path):
+    values = {"uavs": [2], "zones.pads": [0, 1]}
+    found = searched_sea(tmp_path, ["greedy"], {"success": 0.5}, values)
+    priced = priced_settings(found).set_index("fleet")[COST]
+    assert priced.to_dict() == {
+        "2 UAVs, 6 pads in zone 1 and no zone 2": 2600,
+        "2 UAVs, 6 pads in zone 1 and 1 pad in zone 2": 2700,
+    }
+    best = search_of(found).best
+    assert best.fleet == "2 UAVs, 6 pads in zone 1 and no zone 2" and best.cost == 2600
+    assert not found.scenario(best.points[0]).zones
 
 
 @pytest.mark.parametrize("first", [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -249,4 +263,7 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     (text,) = search_of(found).reason_sentences()
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
-    assert "The budget of 40 missions ended before this was decided; about" in text
+    pair = "**1–3 UAVs, 1 pad in zone 1 and 1 pad in zone 2** with the policy `random`"
+    undecided = f"before it was decided whether {pair} meets the requirements; about "
+    assert f"The budget of 40 missions ended {undecided}" in text
+    assert " missions would settle it." in text
