@@ -187,6 +187,11 @@ def rendered() -> list[Path]:
     return [path for path in paths if not path.name.endswith(".partial.html")]
 
 
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Let the keyboard reach tables, which scroll where they are wide."""
+    return html.replace("<table>", '<table tabindex="0">')
+
+
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Fill in the parts made from the code, and turn links to where files are in the site."""
     if not page.file.src_uri.startswith("source/"):

@@ -320,15 +320,16 @@ def make_table(
     caption = ". ".join(
         filter(None, [caption, numbers.why_nan(frame.astype(object).fillna("").to_numpy().flat)])
     )
+    above = ""
     if caption:
-        html = html.replace(">", f"><caption>{set_indices(caption)}</caption>", 1)
+        above = f'<p class="caption">{set_indices(caption)}</p>'  # what scrolls would take it away
     below = ""
     if data is not None:
         below = _download_links(caption, data, frame)
     label = escape(caption or "Table")
-    return HTML(
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
-    )
+    html = html.replace("<table", f'<table aria-label="{label}"', 1)
+    inside = f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>'
+    return HTML(f"{above}{inside}{below}")
 
 
 def _align_numbers(table: str, columns: int) -> str:
