@@ -661,7 +661,7 @@ def plot_performance(
                 label=f"paper {measure.write(printed.mean)}",
                 zorder=1,
             )
-        ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)
+        ax.set(xlabel=measure.label, xlim=(-0.02, 1.02) if measure.is_bounded else None)
         style.set_axis_unit(ax.xaxis, measure.axis, 5)
     return figure
 
@@ -689,7 +689,7 @@ def plot_by_fleet(
                 color=style.INK,
                 **PRINTED,
             )
-        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+        ax.set(ylabel=METRICS[metric], xlabel="number of UAVs", ylim=(-0.03, 1.04))
     return figure
 
 

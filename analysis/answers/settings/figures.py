@@ -112,7 +112,7 @@ def plot_curves(
             if panel:
                 title = field_named(panel).words(value)
             ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
-        figure.suptitle(metric_of(metric).label, fontsize=11, fontweight="bold")
+        figure.supylabel(metric_of(metric).label, fontsize=10)
         axes.flat[-1].set_xlabel(field_named(x).label, parse_math=True)
     return figure
 
@@ -354,7 +354,7 @@ def _panel_per_field(
         for ax, field in zip(axes, fields, strict=True):
             draw(field, ax)
             ax.set_xlabel(fill(field_named(field).label, 28), parse_math=True)
-        figure.suptitle(metric.label, fontsize=11, fontweight="bold")
+        figure.supylabel(metric.label, fontsize=10)
     return figure
 
 
