@@ -39,7 +39,7 @@ from dess.base.errors import printable
 from dess.reports.pages import ASKED
 from dess.reports.pages.page import STUDY, Learned, Page, hidden_element
 
-STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
+STUDIES_BESIDE = 3  # studies with a column in one table of what they were made with
 FEW_WORDS = 18  # characters of a cell that is not broken
 SENTENCES = 150  # characters of a cell from which on its column is wide
 SHORT = 12  # characters of a hash that are shown
