@@ -10,7 +10,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
-from dess.analysis.figures import Drawing
+from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import (
     ALWAYS,
     HOME,
@@ -697,6 +697,7 @@ def draw_performance(results: Results, metric: str) -> Drawing:
     """A metric of every policy at the only design point."""
     table = means_of_points(results)
     data = table[table["metric"] == metric]
-    caption = f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
+    caption = name_best_mean(data, metric, ["policy"])
+    caption += f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} of every policy"
     return Drawing(plot_performance(table, metric), alt, caption, data)
