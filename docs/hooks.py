@@ -5,7 +5,8 @@
   rendered report.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
-- The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them.
+- The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them,
+  with one page that simulates in the browser.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typer.cli import get_docs_for_click
 import dess
 from dess.analysis.names import declared_fields
 from dess.reports.cli.commands import app
+from dess.reports.pages.index import make_index
 
 if TYPE_CHECKING:  # the tests import this module without MkDocs
     from mkdocs.config.defaults import MkDocsConfig
@@ -35,6 +37,7 @@ LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
 PART = re.compile(r"^<!-- \[\[ (\w+)(?: ([\w -]+))? \]\] -->$", re.M)
 README = "README.md"
 REPORTS = ROOT / "build" / "reports"
+LIVE = "live.html"  # a page that simulates in every site, with reports or without them
 
 
 # --- parts made from the code ---
@@ -100,12 +103,16 @@ def section_of_readme(heading: str) -> str:
 
 
 def live(report: str) -> str:
-    """A rendered report inside a page in the root of the site; without it, how to make it."""
-    name = f"{report}.html"
-    if not (REPORTS / name).is_file():
-        return f"(`nox -s reports` makes such a page, `build/reports/{name}`.)"
-    frame = f'<iframe class="live" src="reports/{name}#panel" title="{report}" loading="lazy">'
-    return f"[The page alone](reports/{name}), and here:\n\n{frame}</iframe>"
+    """A page that simulates inside one in the root of the site: a rendered report, or ``LIVE``."""
+    address = f"reports/{report}.html"
+    part = "panel"
+    if not (REPORTS / f"{report}.html").is_file():
+        address = LIVE
+        part = "try"
+    frame = (
+        f'<iframe class="live" src="{address}#{part}" title="A page that simulates" loading="lazy">'
+    )
+    return f"[The page alone]({address}), and here:\n\n{frame}</iframe>"
 
 
 def reports() -> str:
@@ -154,7 +161,7 @@ def shown(path: str) -> str:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add a page for every file outside of ``docs/`` that a page links to, and the reports."""
+    """Add a page for every file outside of ``docs/`` that a page links to, and what is rendered."""
     from mkdocs.structure.files import File, InclusionLevel
 
     pending = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
@@ -176,6 +183,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
                 config, place(path), content=shown(path), inclusion=InclusionLevel.NOT_IN_NAV
             )
             files.append(page)
+    files.append(File.generated(config, LIVE, content=make_index({})))
     for path in rendered():
         files.append(File.generated(config, f"reports/{path.name}", abs_src_path=str(path)))
     return files
@@ -185,6 +193,11 @@ def rendered() -> list[Path]:
     """The pages of the reports that did not fail, and their notebooks."""
     paths = sorted([*REPORTS.glob("*.html"), *REPORTS.glob("*.ipynb")])
     return [path for path in paths if not path.name.endswith(".partial.html")]
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Let the keyboard reach tables, which scroll where they are wide."""
+    return html.replace("<table>", '<table tabindex="0">')
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:

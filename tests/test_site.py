@@ -43,7 +43,11 @@ def site(tmp_path_factory):
 
 
 def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site, chromium):
-    others = {site / "404.html", *site.glob("reports/*")}  # of a server alone; tested elsewhere
+    others = {
+        site / "404.html",
+        site / "live.html",
+        *site.glob("reports/*"),
+    }  # of a server alone; tested elsewhere
     pages = sorted({*site.rglob("*.html")} - others)
     assert len(pages) > 40
     for path in pages:
@@ -71,7 +75,8 @@ CONTRASTS = """(() => {
             .map((c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
         return 0.2126 * r + 0.7152 * g + 0.0722 * b;
     };
-    const texts = ".md-content a:not(.headerlink), .md-header__title, .md-nav__link";
+    const texts = ".md-content a:not(.headerlink), .md-header__title, .md-nav__link, "
+        + ".highlight code span[class]";
     return [...document.querySelectorAll(texts)]
         .filter((element) => element.checkVisibility() && element.textContent.trim())
         .map((element) => {
@@ -91,4 +96,37 @@ def test_links_and_titles_are_readable(site, chromium, scheme):
     found = page.evaluate(CONTRASTS)
     assert len(found) > 30
     assert [pair for pair in found if pair[0] < 4.5] == []
+    page.close()
+
+
+def test_the_search_finds_the_page_of_the_fleet_by_the_question(site, chromium):
+    """Somebody who asks "which fleet should I buy" reads how to find the cheapest one."""
+    page = Visit(chromium, site / "index.html", WIDTHS[0]).page
+    page.locator(".md-search__input").click()
+    page.keyboard.type("which fleet should I buy")
+    first = page.locator(".md-search-result__item h1").first
+    first.wait_for()
+    assert first.text_content() == "Which fleet should I buy?"
+    page.close()
+
+
+def test_tables_have_heads_and_take_the_keyboard(site, chromium):
+    """A table that is wide scrolls, so the keyboard has to reach it; links are underlined."""
+    for name in ("environments.html", "performance.html", "index.html"):
+        page = Visit(chromium, site / name, WIDTHS[1]).page
+        heads = page.locator("thead th").all_text_contents()
+        assert heads and all(map(str.strip, heads)), name
+        assert page.locator(".md-content table:not([tabindex])").count() == 0, name
+        links = page.locator(".md-content :is(p, li, td) a:not(.headerlink, .md-icon)")
+        lines = links.evaluate_all("all => all.map((a) => getComputedStyle(a).textDecorationLine)")
+        assert lines and {*lines} == {"underline"}, name
+        page.close()
+
+
+def test_the_site_has_a_page_that_simulates(site, chromium):
+    """Without rendered reports too, within the tutorial."""
+    page = Visit(chromium, site / "tutorial.html", WIDTHS[0]).page
+    frame = page.frame_locator("iframe.live")
+    page.locator("iframe.live").scroll_into_view_if_needed()
+    frame.get_by_role("button", name="Run").first.wait_for()
     page.close()

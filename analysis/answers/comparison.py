@@ -443,7 +443,7 @@ def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float
                 fillstyle = "none"
             dot = style.dot_style((COLOURS[verdict], "o")) | {"fillstyle": fillstyle}
             style.plot_with_bars(part, part["position"], ax, linestyle="", **dot)
-        ax.set_title(field_named(rows["field"].iloc[0]).label, parse_math=True)
+        ax.set_xlabel(field_named(rows["field"].iloc[0]).label, parse_math=True)
         ax.set(ylabel="mean difference [points]", ylim=ends)
         ax.set_xticks(rows["position"], rows["value"])
         style.set_axis_unit(ax.yaxis, "points")

@@ -168,7 +168,7 @@ def _plot_variants(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> "F
             style.note_at_right(f"{row['mean']:.1%}, n = {row['n']}", y, ax)
         names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
         ax.set_yticks(range(len(table)), names)
-        ax.set(title=METRICS[PRODUCT], ylim=(len(table) - 0.4, -0.6))
+        ax.set(xlabel=METRICS[PRODUCT], ylim=(len(table) - 0.4, -0.6))
         style.set_axis_unit(ax.xaxis, "%", 5)
         ax.set_xlim(left, right)
     return figure
@@ -427,7 +427,7 @@ def plot_trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str])
         high = averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         style.set_axis_unit(ax.yaxis, "%" if metric == LEARNED_PRODUCT else "")
-        ax.set(title=SHOWN[metric], ylim=(low - room, high + room))
+        ax.set(ylabel=SHOWN[metric], ylim=(low - room, high + room))
         _steps_axis(drawn, ax)
     return figure
 

@@ -290,11 +290,13 @@ def plot_effect(
     with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
         for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
             style.plot_along(rows[rows["metric"] == metric], looks, "%", ax)
-            ax.set(title=name, ylim=style.axis_ends(table[table["metric"] == metric], 0.1))
+            ax.set(
+                ylabel=fill(name, 16), ylim=style.axis_ends(table[table["metric"] == metric], 0.1)
+            )
         style.plot_along(steps, looks, "points", axes[-1])
         axes[-1].axhline(0, **style.ZERO)
         title = f"Paired difference from the value at {first['value'].iloc[0]}"
-        axes[-1].set(title=title, ylabel="points")
+        axes[-1].set(title=title, ylabel="percentage\npoints")
         axes[-1].set_xlabel(field_named(field).label, parse_math=True)
     return figure
 
@@ -328,5 +330,5 @@ def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
             style.plot_along(rows[rows["field"] == field], looks, "%", ax)
             ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
             ax.tick_params(axis="x", labelsize=8)
-        figure.suptitle(metric_of(PRODUCT).label, fontsize=11, fontweight="bold", x=0.01, ha="left")
+        figure.supylabel(metric_of(PRODUCT).label, fontsize=10)
     return figure

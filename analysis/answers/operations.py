@@ -15,7 +15,7 @@ from dess.analysis import numbers
 from dess.analysis.answers.settings.effects import average_over_others
 from dess.analysis.answers.settings.figures import plot_curves
 from dess.analysis.answers.settings.points import values_of_points, varied_values
-from dess.analysis.figures import Drawing
+from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.figures.missions import plot_courses
 from dess.analysis.metrics import (
     AGE,
@@ -89,7 +89,7 @@ def draw_means(
         str(metric): Drawing(
             plot_curves(rows, x, line, str(metric), panel),
             f"{metric_of(str(metric)).name} against {against}",
-            caption,
+            name_best_mean(rows, str(metric), ["policy", x, line]) + caption,
             rows if linked else None,
         )
         for metric, rows in means.groupby("metric", sort=False)

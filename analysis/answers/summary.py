@@ -10,7 +10,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
-from dess.analysis.figures import Drawing
+from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import (
     ALWAYS,
     HOME,
@@ -663,7 +663,7 @@ def plot_performance(
                 label=f"paper {measure.write(printed.mean)}",
                 zorder=1,
             )
-        ax.set(title=measure.name, xlim=(-0.02, 1.02) if measure.is_bounded else None)
+        ax.set(xlabel=measure.label, xlim=(-0.02, 1.02) if measure.is_bounded else None)
         style.set_axis_unit(ax.xaxis, measure.axis, 5)
     return figure
 
@@ -691,7 +691,7 @@ def plot_by_fleet(
                 color=style.INK,
                 **PRINTED,
             )
-        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+        ax.set(ylabel=METRICS[metric], xlabel="number of UAVs", ylim=(-0.03, 1.04))
     return figure
 
 
@@ -699,6 +699,7 @@ def draw_performance(results: Results, metric: str) -> Drawing:
     """A metric of every policy at the only design point."""
     table = means_of_points(results)
     data = table[table["metric"] == metric]
-    caption = f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
+    caption = name_best_mean(data, metric, ["policy"])
+    caption += f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} of every policy"
     return Drawing(plot_performance(table, metric), alt, caption, data)

@@ -56,7 +56,7 @@ def plot_sides(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure
     rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(sides))))
     with style.new_panels(4.1, values="y") as (figure, ax):
         style.plot_along(rows, style.policy_colours(rows["policy"]), metric_of(metric).axis, ax)
-        ax.set(title=metric_of(metric).label, xlim=(-0.45, 1.45))
+        ax.set(ylabel=metric_of(metric).label, xlim=(-0.45, 1.45))
         ax.set_xticks((0, 1), sides)
         if metric in METRICS:
             ax.set_ylim(style.axis_ends(rows, 0.05))

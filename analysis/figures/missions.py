@@ -6,6 +6,7 @@ puts them together. Nothing touches pyplot's state.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from textwrap import fill
 
 import matplotlib as mpl
 import numpy as np
@@ -230,7 +231,7 @@ def plot_courses(
         rows: Rows with ``panel``, ``slot``, ``mean``, ``low`` and ``high``.
         line: The column.
         unit: The unit of the means: ``%``, ``points``, or empty for plain numbers.
-        titles: The titles of the panels, by ``panel``.
+        titles: What the panels show, by ``panel``.
         heading: The title of the legend.
     """
     if line != "policy":
@@ -250,7 +251,7 @@ def plot_courses(
                 ax.fill_between(course["slot"], course["low"], course["high"], step="post",
                                 **style.band(colour))  # fmt: skip
                 ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))
-            ax.set(title=title, ylim=(0, None), xlim=(0, rows["slot"].max()))
+            ax.set(ylabel=fill(title, 24), ylim=(0, None), xlim=(0, rows["slot"].max()))
             style.set_axis_unit(ax.yaxis, unit, 4)
         axes.flat[-1].set_xlabel("mission slot")
     return figure

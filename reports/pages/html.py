@@ -39,7 +39,7 @@ from dess.base.errors import printable
 from dess.reports.pages import ASKED
 from dess.reports.pages.page import STUDY, Learned, Page, hidden_element
 
-STUDIES_BESIDE = 6  # studies with a column in one table of what they were made with
+STUDIES_BESIDE = 3  # studies with a column in one table of what they were made with
 FEW_WORDS = 18  # characters of a cell that is not broken
 SENTENCES = 150  # characters of a cell from which on its column is wide
 SHORT = 12  # characters of a hash that are shown
@@ -320,15 +320,16 @@ def make_table(
     caption = ". ".join(
         filter(None, [caption, numbers.why_nan(frame.astype(object).fillna("").to_numpy().flat)])
     )
+    above = ""
     if caption:
-        html = html.replace(">", f"><caption>{set_indices(caption)}</caption>", 1)
+        above = f'<p class="caption">{set_indices(caption)}</p>'  # what scrolls would take it away
     below = ""
     if data is not None:
         below = _download_links(caption, data, frame)
     label = escape(caption or "Table")
-    return HTML(
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
-    )
+    html = html.replace("<table", f'<table aria-label="{label}"', 1)
+    inside = f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>'
+    return HTML(f"{above}{inside}{below}")
 
 
 def _align_numbers(table: str, columns: int) -> str:

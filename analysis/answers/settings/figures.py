@@ -23,7 +23,7 @@ from dess.analysis.answers.settings.effects import (
 )
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import rank_settings
-from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import Drawing, name_best_mean, style
 from dess.analysis.metrics import PRODUCT, Metric, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
@@ -76,7 +76,8 @@ def draw_curves(
     data = average_over_others(results, [x, hue] if hue else [x], metric, policy)
     drawing = plot_curves(data, x, hue or "policy", metric, "policy" if hue else None)
     mark = "dot" if hue else "point"
-    caption = f"n = {counted_missions(data)} missions per {mark}; bars are {INTERVALS}."
+    caption = name_best_mean(data, metric, ["policy", x, *filter(None, [hue])])
+    caption += f"n = {counted_missions(data)} missions per {mark}; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} against the {field_named(x).within}"
     return Drawing(drawing, alt, caption, data)
 
@@ -112,7 +113,7 @@ def plot_curves(
             if panel:
                 title = field_named(panel).words(value)
             ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
-        figure.suptitle(metric_of(metric).label, fontsize=11, fontweight="bold")
+        figure.supylabel(metric_of(metric).label, fontsize=10)
         axes.flat[-1].set_xlabel(field_named(x).label, parse_math=True)
     return figure
 
@@ -197,7 +198,8 @@ def draw_heat_map(
         figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
     unit = "in percent, " if measure.in_percent else ""
     counted = "replications" if facet else "missions"
-    caption = f"Means of {policy}, {unit}n = {counted_missions(data)} {counted} per cell. "
+    caption = name_best_mean(data, metric, named)
+    caption += f"Means of {policy}, {unit}n = {counted_missions(data)} {counted} per cell. "
     if facet:
         caption += f"One panel for each value of the {field_named(facet).within}"
         caption += f"{_left_out_in_words(values[facet], panels)}. "
@@ -354,7 +356,7 @@ def _panel_per_field(
         for ax, field in zip(axes, fields, strict=True):
             draw(field, ax)
             ax.set_xlabel(fill(field_named(field).label, 28), parse_math=True)
-        figure.suptitle(metric.label, fontsize=11, fontweight="bold")
+        figure.supylabel(metric.label, fontsize=10)
     return figure
 
 

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from dess.analysis.answers.summary import plot_by_fleet, plot_performance
-from dess.analysis.figures import comparison, style
-from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
+from dess.analysis.figures import comparison, name_best_mean, style
+from dess.analysis.metrics import AGE, BOUND, PRODUCT, SUCCESS
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,12 @@ def test_a_bar_is_dark_as_far_as_the_missions_tell_and_pale_beyond():
         np.array([[-0.01, 0.04], [0.012, 0.016], [-0.3, -0.1], [-0.3, -0.1]])
     )
     assert [bar.get_alpha() for bar in bars] == [style.PALE, None, style.PALE, None]
+
+
+def test_the_caption_names_the_best_mean():
+    """The highest one, or the lowest where less is better; nothing where all are equal."""
+    rows = pd.DataFrame({"policy": ["greedy"] * 3, "uavs": [1, 2, 3], "mean": [0.6, 0.9, np.nan]})
+    sentence = name_best_mean(rows, PRODUCT, ["policy", "uavs"])
+    assert sentence == "The highest mean is 90.0 %, of policy greedy, 2 UAVs. "
+    assert name_best_mean(rows, AGE, ["uavs"]).startswith("The lowest mean is 0.6")
+    assert name_best_mean(rows.assign(mean=1.0), PRODUCT, ["uavs"]) == ""

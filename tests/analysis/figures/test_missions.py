@@ -107,7 +107,7 @@ def test_a_course_is_a_line_per_value_in_the_panel_of_its_rows():
     rows = {"policy": [*"aabb"], "slot": [0, 1] * 2, "panel": [1, 1, 2, 2]}
     rows |= dict.fromkeys(("mean", "low", "high"), [1.0, 0.5, 1.0, 0.0])
     drawing = missions.plot_courses(pd.DataFrame(rows), "policy", "%", {1: "One", 2: "Two"})
-    drawn = {ax.get_title(loc="left"): ax.lines[0].get_ydata().tolist() for ax in drawing.axes}
+    drawn = {ax.get_ylabel(): ax.lines[0].get_ydata().tolist() for ax in drawing.axes}
     assert drawn == {"One": [1.0, 0.5], "Two": [1.0, 0.0]}
 
 

@@ -36,3 +36,12 @@ def test_nan_is_explained_only_where_it_is_shown():
     assert (
         "nan: the missions are too few" in html.make_table(pd.DataFrame({"p": ["nan"]}), "P").data
     )
+
+
+def test_the_caption_stands_outside_of_what_scrolls():
+    """Otherwise the caption of a wide table scrolls away with it."""
+    shown = html.make_table(pd.DataFrame({"n": [1]}), "Missions at C_S").data
+    above, _, inside = shown.partition('<div class="scroll"')
+    assert above == '<p class="caption">Missions at C<sub>S</sub></p>'
+    assert "caption" not in inside
+    assert '<table aria-label="Missions at C_S"' in inside
