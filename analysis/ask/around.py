@@ -90,6 +90,19 @@ def is_known(results: Results) -> bool:
     return (_place_of_question(results) / MANIFEST).exists()
 
 
+def load_around(results: Results) -> Results:
+    """The results of ``question_around``: the fleet at design point 0, then every change of it."""
+    return load_results(_place_of_question(results))
+
+
+def list_changes(changed_results: Results) -> list[dict[str, Any]]:
+    """What is changed at the design points of ``load_around`` from 1 on: a field and its value."""
+    start, *rows = [point.values for point in changed_results.store.manifest.points]
+    return [
+        {field: value for field, value in row.items() if value != start.get(field)} for row in rows
+    ]
+
+
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
     return place_beside(results, "one-more")
@@ -114,13 +127,12 @@ def table_around(results: Results) -> Table:
     Args:
         results: The study that ``question_around`` was asked about.
     """
-    changed_results = load_results(_place_of_question(results))
+    changed_results = load_around(results)
     requirements = requirements_of(results)
-    start, *rows = [point.values for point in changed_results.store.manifest.points]
-    changes = [{f: v for f, v in row.items() if v != start.get(f)} for row in rows]
+    changes = list_changes(changed_results)
     space = changed_results.scenario(0)
     of_search = _verdicts_of_search(results)
-    words = ["the fleet", *(_in_words(space, change) for change in changes)]
+    words = ["the fleet", *(change_in_words(space, change) for change in changes)]
     refused = [change for change in _changed_fields(space) if change not in changes]
     data = priced_settings(changed_results)
     scenarios = [changed_results.scenario(point) for point in data["point"]]
@@ -159,7 +171,7 @@ def table_around(results: Results) -> Table:
         "interval of each mean says so, otherwise open"
     )
     if refused:
-        refused_in_words = [_in_words(space, change) for change in refused]
+        refused_in_words = [change_in_words(space, change) for change in refused]
         caption += f". Cannot be simulated here: {'; '.join(refused_in_words)}"
     return Table(cells, caption, data)
 
@@ -174,9 +186,9 @@ def one_more_sentence(results: Results) -> str:
     """
     if not is_known(results):
         return ""
-    changed_results = load_results(_place_of_question(results))
-    start, *rows = [point.values for point in changed_results.store.manifest.points]
-    with_one_more = [n for n, row in enumerate(rows, 1) if row.get("uavs") != start.get("uavs")]
+    changed_results = load_around(results)
+    changes = list_changes(changed_results)
+    with_one_more = [point for point, change in enumerate(changes, 1) if "uavs" in change]
     if not with_one_more:
         return ""
     costs = priced_settings(changed_results).set_index("point")[COST]
@@ -212,7 +224,8 @@ def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verd
     return Verdict.of_all(verdicts)
 
 
-def _in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
+def change_in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
+    """A change around a fleet, as ``3 UAVs``."""
     ((field, value),) = change.items()
     if field == "pads":
         return pads_in_words(len(space.zone_pads), 1, value)

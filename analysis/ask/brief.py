@@ -3,6 +3,7 @@
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.risk import risk_sentence
 from dess.analysis.ask.around import one_more_sentence
+from dess.analysis.ask.falls import fall_sentences
 from dess.analysis.ask.limits import limit_sentences
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
@@ -10,6 +11,8 @@ from dess.analysis.study.cheapest import Cheapest
 
 def brief_sentences(results: Results) -> list[str]:
     """The risk of the cheapest fleet, what breaks it first, and what one more UAV brings.
+
+    Where one more UAV or pad collects less, they say why.
 
     Args:
         results: A study. Without a data sheet or a search for the cheapest fleet there are none.
@@ -22,5 +25,6 @@ def brief_sentences(results: Results) -> list[str]:
         risk_sentence(results, best.policy, best.points),
         *limit_sentences(results),
         one_more_sentence(results),
+        *fall_sentences(results),
     ]
     return [sentence for sentence in sentences if sentence]

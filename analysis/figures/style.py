@@ -48,6 +48,7 @@ READABLE = 4.5  # the least contrast of a text with its ground (WCAG 2.1, 1.4.3)
 OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
 # In all figures, blue means better, orange worse, and grey inconclusive.
 BETTER, WORSE = "#0173b2", "#c05000"
+NAMED_PART = 0.05  # the smallest part of a bar in which its share is written
 PALE = 0.35  # the opacity of what a bar allows for rare failures
 ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference
 
@@ -429,3 +430,23 @@ def name_ticks(axis: Axis, values: Sequence[Any], places: Sequence[float] | np.n
 def plot_front(paid: pd.Series, reached: pd.Series, label: str, ax: Axes) -> None:
     """A front as steps: what is reached by paying so much."""
     ax.step(paid, reached, where="post", color=INK, linewidth=1.1, zorder=1, label=label)
+
+
+def plot_parts(shares: pd.DataFrame, label: str) -> Figure:
+    """Parts of a whole, side by side in one bar for each row, from the first row at the top.
+
+    Args:
+        shares: (rows, parts) the shares; the sum of a row is 1.
+        label: What the whole is.
+    """
+    with new_panels(1.4 + 0.42 * len(shares), values="x") as (figure, ax):
+        left = pd.Series(0.0, shares.index)
+        for part, colour in zip(shares, readable_palette(), strict=False):
+            bars = ax.barh(shares.index, shares[part], left=left, color=colour, label=part)
+            texts = [f"{share:.0%}" if share >= NAMED_PART else "" for share in shares[part]]
+            ax.bar_label(bars, texts, label_type="center", color="white", fontsize=8)
+            left += shares[part]
+        ax.invert_yaxis()
+        ax.set(xlim=(0, 1), xlabel=label)
+        set_axis_unit(ax.xaxis, "%")
+    return figure

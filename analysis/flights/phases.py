@@ -1,15 +1,18 @@
-"""What each UAV of a mission does, one phase after the other: it flies, charges or stands."""
+"""What each UAV of a mission does: phases of flight, charging and standing, and shares of time."""
 
 from collections.abc import Iterator
 from itertools import groupby
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from dess.analysis.results.event_log import (
     Events,
     battery_levels,
     causes_of_failure,
+    mission_length,
+    slots_of,
     uav_slots,
 )
 from dess.base.errors import InputError
@@ -18,6 +21,10 @@ from dess.physics.fleet import type_of
 from dess.scenario.scenario import Scenario
 
 FLIGHT, CHARGING, STANDING = "flight", "charging", "standing"
+# What a UAV does with its time, in the words of a sentence.
+SERVES, CHARGES, WAITS = "collects data", "charges", "waits for a pad"
+KEPT, FLIES, STANDS = "is kept from a cell", "flies without collecting", "stands"
+ACTIVITIES = (SERVES, CHARGES, WAITS, KEPT, FLIES, STANDS)
 
 
 class Visit(NamedTuple):
@@ -83,6 +90,58 @@ def list_phases(events: Events, scenario: Scenario) -> list[list[Phase]]:
             phases.append(Phase(uav, kind, start, end, battery, tuple(_list_visits(slots, kind))))
         of_uavs.append([*_without_hops(phases, scenario)])
     return of_uavs
+
+
+def share_of_activities(events: Events, scenario: Scenario) -> pd.Series:
+    """The share of time that the UAVs of a mission spend with each of ``ACTIVITIES``.
+
+    A UAV collects data in the communication slots in which it serves a node. The rest of its slot
+    counts for the first of these: it charges; waits for a pad; is kept from a cell, where the
+    safety controller overrules it because of other UAVs; flies or hovers. Otherwise it stands: in a
+    zone, under repair, or since its own mission has ended.
+
+    Args:
+        events: The event log (a data frame, or the columns, of ``dess.model.events.EventLog``).
+        scenario: The scenario of the mission.
+
+    Returns:
+        The shares of all slots of all UAVs, whose sum is 1, by the words of ``ACTIVITIES``.
+    """
+    log = pd.DataFrame(events)
+    overruled = slots_of(log[log["other"] >= 0], "collision")
+    slots = dict.fromkeys(ACTIVITIES, 0.0)
+    communications = _count_communications(log)
+    for uav, rows in uav_slots(log).groupby("uav"):
+        labels = _label_slots(rows, scenario, int(uav))
+        for row, label in zip(rows.itertuples(), labels, strict=True):
+            is_kept = (uav, label.number) in overruled
+            count = communications.get((uav, label.number), 0)
+            served = count / scenario.communication_slots
+            slots[SERVES] += served
+            slots[_name_activity(row, label.kind == FLIGHT, is_kept)] += 1 - served
+    in_all = scenario.uavs * mission_length(log)
+    slots[STANDS] += in_all - sum(slots.values())
+    return pd.Series(slots) / in_all
+
+
+def _count_communications(log: pd.DataFrame) -> dict[tuple[int, int], int]:
+    """The communication slots in which a UAV serves a node, by UAV and slot."""
+    served = log[log["event"] == "communication"]
+    slots = np.ceil(served["time"]).astype(int) - 1  # the last one is at the end of the slot
+    return served.groupby([served["uav"], slots]).size().to_dict()
+
+
+def _name_activity(row: Any, is_flying: bool, is_kept: bool) -> str:
+    """What a UAV does in a slot while it serves no node; ``row`` is one of ``uav_slots``."""
+    if row.charging:
+        return CHARGES
+    if row.waiting:
+        return WAITS
+    if is_kept:
+        return KEPT
+    if is_flying and not row.grounded:
+        return FLIES
+    return STANDS
 
 
 def _without_hops(phases: list[Phase], scenario: Scenario) -> Iterator[Phase]:

@@ -185,8 +185,8 @@ def _is_between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) ->
 
 def _is_waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     """A UAV waits from its ``charge_request`` on until it charges, moves off or tries to."""
-    overruled = _slots_of(log, "collision")
-    requested = _slots_of(log, "charge_request")
+    overruled = slots_of(log, "collision")
+    requested = slots_of(log, "charge_request")
     waiting = np.zeros(len(table), bool)
     queued = False
     keys = zip(table["uav"], table["slot"], table["moved"], table["charging"], strict=True)
@@ -197,7 +197,7 @@ def _is_waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     return waiting
 
 
-def _slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
+def slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
     """UAV and slot of every event of a kind."""
     rows = log[log["event"] == event]
     return set(zip(rows["uav"], rows["time"].astype(int), strict=True))

@@ -40,6 +40,7 @@ from dess.analysis.answers.settings.points import fleets_in_words, has_condition
 from dess.analysis.ask import around
 from dess.analysis.ask.assumptions import assumption_sentences
 from dess.analysis.ask.brief import brief_sentences
+from dess.analysis.ask.falls import draw_falls
 from dess.analysis.ask.limits import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
@@ -105,7 +106,7 @@ html.make_gallery(
 
 # %%
 if around.is_known(found):
-    html.show_parts(around.table_around(found))
+    html.show_parts(around.table_around(found), draw_falls(found))
 
 # %% [markdown]
 # ## How far to trust it

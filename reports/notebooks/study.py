@@ -124,8 +124,9 @@ html.show_parts(fleet_tables.condition_table(study))
 
 # %% tags=["if-around"]
 from dess.analysis.ask import around
+from dess.analysis.ask.falls import draw_falls
 
-html.show_parts(around.table_around(study))
+html.show_parts(around.table_around(study), draw_falls(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it

@@ -352,10 +352,10 @@ def test_the_limit_of_failures_is_that_of_many_missions(searched, limited):
 
 @pytest.mark.parametrize("repair", [{}, {"repair": "20 min"}])
 def test_means_at_a_rate_of_failures_follow_from_other_rates(repair):
-    """Of 150 missions with a failure every hour and 150 without; 600 with one every 4 h agree."""
+    """Of 300 missions with a failure every hour and 300 without; 600 with one every 4 h agree."""
     policy = load("greedy")
     flights = {}
-    missions = {1e-8: 150, 1.0: 150, 0.25: 600}
+    missions = {1e-8: 300, 1.0: 300, 0.25: 600}
     for rate, number in missions.items():
         sheet = SHEET["data_sheet"] | repair | {"mtbf": f"{1 / rate:g} h".replace("e+08", "0" * 8)}
         space = ScenarioSpace.of(**(SCENARIO | SHEET | {"uavs": 2, "data_sheet": sheet}))
@@ -366,7 +366,7 @@ def test_means_at_a_rate_of_failures_follow_from_other_rates(repair):
     model = limits.FailureModel(flights[1e-8], flights[1.0])
     for column in ("success", "collection_ratio"):
         values = flights[0.25].metrics[column]
-        assert model.mean(column, 0.25) == pytest.approx(values.mean(), abs=0.05)
+        assert model.mean(column, 0.25) == pytest.approx(values.mean(), abs=0.06)
     assert flights[0.25].metrics["success"].mean() > flights[1.0].metrics["success"].mean() + 0.1
 
 

@@ -1,0 +1,172 @@
+"""Why one more UAV or pad of the cheapest fleet collects less, from event logs of few missions.
+
+fall_sentences(results)  # results of a search, of which ``around.question_around`` was asked
+draw_falls(results)
+"""
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from dess.analysis import numbers
+from dess.analysis.ask import around
+from dess.analysis.figures import Drawing
+from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
+from dess.analysis.metrics import RATIO, metric_of
+from dess.analysis.results.resimulate import resimulate
+from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.differences import compare, differences_of, t_test
+from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.verdict import (
+    BELOW,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_BELOW,
+    judge_difference,
+    position_of,
+)
+
+MISSIONS = 10  # of the fleet, and of each neighbour that collects less
+NAMED = 3  # the largest number of activities that a sentence names
+
+
+@dataclass(frozen=True, eq=False)
+class Fall:
+    """A neighbour of the cheapest fleet that collects less than the fleet.
+
+    Attributes:
+        fleet: What is one more, as ``3 UAVs``.
+        before: The same of the fleet, as ``2 UAVs``.
+        policy: Who flies.
+        difference: The paired difference of the collection ratio, as ``compare`` returns it.
+        is_certain: Whether a rare failure is ruled out as its cause.
+        shares: (MISSIONS, activities) the shares of time.
+        shares_before: The same of the fleet, in the same missions.
+    """
+
+    fleet: str
+    before: str
+    policy: str
+    difference: pd.Series
+    is_certain: bool
+    shares: pd.DataFrame
+    shares_before: pd.DataFrame
+
+    def sentence(self) -> str:
+        """How much less is collected, what the UAVs do instead, and whose fault it is."""
+        metric = metric_of(RATIO)
+        change = metric.change(*self.difference[["difference", "low", "high"]])
+        doubt = ""
+        if not self.is_certain:
+            doubt = f" in what was seen ({NOT_RULED_OUT})"
+        return (
+            f"With {self.fleet} instead of {self.before}, the {metric.within} is lower{doubt}, by "
+            f"{change} points: {self._changes_of_time()}. This is due to the policy "
+            f"{self.policy} and its return guard, not to the fleet: it could do as well as the "
+            "smaller one if what is added stayed unused."
+        )
+
+    def _changes_of_time(self) -> str:
+        """The activities whose shares of time differ most, with their means."""
+        changes = []
+        for activity in ACTIVITIES:
+            now = self.shares[activity].to_numpy()
+            before = self.shares_before[activity].to_numpy()
+            change, _ = t_test(differences_of(now, before), LEVEL)
+            if position_of(change) != INCONCLUSIVE:
+                share = numbers.format_percent(now.mean())
+                share_before = numbers.format_percent(before.mean())
+                text = f"{activity} for {share} of its time instead of {share_before}"
+                changes.append((abs(change.mean), text))
+        missions = f"in {len(self.shares)} missions of both"
+        if not changes:
+            return f"{missions}, the shares of time of the UAVs do not differ significantly"
+        changes.sort(reverse=True)
+        most = [text for _, text in changes[:NAMED]]
+        return f"{missions}, a UAV {numbers.join_words(most)}"
+
+
+def find_falls(results: Results) -> list[Fall]:
+    """The neighbours that collect significantly less than the cheapest fleet.
+
+    Args:
+        results: The study; there are none if ``around.question_around`` was not asked about it.
+
+    Raises:
+        InputError: If a mission simulated again differs from the stored one.
+    """
+    if not around.is_known(results):
+        return []
+    return _compare_neighbours(results)
+
+
+@compute_once  # since the sentences and the figure of a page need the same missions
+def _compare_neighbours(results: Results) -> list[Fall]:
+    changed_results = around.load_around(results)
+    space = changed_results.scenario(0)
+    differences = compare(changed_results.missions, 0, [RATIO], correction=None, of="point")
+    differences = differences.set_index("point")
+    falls = []
+    for point, change in enumerate(around.list_changes(changed_results), 1):
+        verdict = judge_difference(differences.loc[point])
+        if verdict not in (BELOW, SEEN_BELOW):
+            continue
+        falls.append(
+            Fall(
+                fleet=around.change_in_words(space, change),
+                before=around.change_in_words(space, _change_back(change)),
+                policy=changed_results.policies[0],
+                difference=differences.loc[point],
+                is_certain=verdict == BELOW,
+                shares=_measure_shares(changed_results, point),
+                shares_before=_measure_shares(changed_results, 0),
+            )
+        )
+    return falls
+
+
+def fall_sentences(results: Results) -> list[str]:
+    """A sentence for each neighbour that collects less; none if there is no such neighbour."""
+    return [fall.sentence() for fall in find_falls(results)]
+
+
+def draw_falls(results: Results) -> list[Drawing]:
+    """The shares of time of the fleet and of its neighbours that collect less.
+
+    Returns:
+        One figure; none if no neighbour collects less.
+    """
+    falls = find_falls(results)
+    if not falls:
+        return []
+    from dess.analysis.figures.style import plot_parts  # figures need the extra reports
+
+    rows = {"the fleet": falls[0].shares_before.mean()}
+    rows |= {fall.fleet: fall.shares.mean() for fall in falls}
+    figure = plot_parts(pd.DataFrame(rows).T, "share of the time of a UAV")
+    fleets = numbers.join_words([fall.fleet for fall in falls])
+    caption = (
+        f"What a UAV does with its time in the fleet of the answer and with {fleets}, which "
+        f"collect{'s' if len(falls) == 1 else ''} less. Means of n = {MISSIONS} missions of each "
+        "with common random numbers, from their event logs. Under repair, or after the end of its "
+        "own mission, a UAV stands."
+    )
+    alt = "Bars of the shares of time, for the fleet and for each that collects less"
+    return [Drawing(figure, alt, caption)]
+
+
+def _change_back(change: dict[str, int]) -> dict[str, int]:
+    """What the fleet has in the place of one more."""
+    return {field: value - 1 for field, value in change.items()}
+
+
+def _measure_shares(results: Results, point: int) -> pd.DataFrame:
+    """The shares of time in the first missions of a design point, a row each."""
+    policy = results.policies[0]
+    missions = results.missions_of(policy)
+    replications = sorted(missions.loc[missions["point"] == point, "replication"])[:MISSIONS]
+    shares = []
+    for replication in replications:
+        mission = resimulate(results, policy, point, replication)
+        shares.append(share_of_activities(mission.events, mission.scenario))
+    return pd.DataFrame(shares)

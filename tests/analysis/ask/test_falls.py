@@ -1,0 +1,119 @@
+"""Where one more UAV collects less, an answer says what the UAVs do with their time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dess.analysis import load_results
+from dess.analysis.ask import around, falls
+from dess.analysis.ask.brief import brief_sentences
+from dess.analysis.ask.question import sweep_question
+from dess.analysis.flights.phases import (
+    CHARGES,
+    FLIES,
+    KEPT,
+    SERVES,
+    STANDS,
+    WAITS,
+    share_of_activities,
+)
+from dess.model.events import EventLog
+from dess.reports.pages.study import make_study_report
+from tests.analysis.flights.hand import scenario_of, write_sea
+from tests.analysis.small import SHEET, write_scenario
+from tests.reports.small import said_by
+
+# A sea with a single pad, short flights, and more data than two UAVs can collect.
+BUSY = {
+    **SHEET,
+    "nodes": [[1, 1], [2, 6], [5, 4], [6, 7], [0, 4], [3, 3]],
+    "pads": 1,
+    "data_sheet": {**SHEET["data_sheet"], "endurance": "20 min", "data_rate": "12 MB/h"},
+}
+
+
+def test_the_shares_of_a_small_mission_are_those_by_hand(tmp_path):
+    """Two UAVs in six slots, of which the second one lands after three."""
+    scenario = scenario_of(write_sea(tmp_path), uavs=2, communication_slots=4)
+    log = EventLog()
+    for uav, x in enumerate((1, 0)):
+        log.add(0.0, "mission_start", uav, -1, 90, x, 0)
+    # It flies for a slot and serves a node in half of it, hovers and serves, is kept from a cell
+    # by the other UAV, flies back to the zone, waits for a pad there, and charges.
+    cells = [(2, 0), (2, 0), (2, 0), (1, 0), (1, 0), (1, 0)]
+    for slot, (x, y) in enumerate(cells):
+        log.add(float(slot), "move", 0, -1, 89 - slot, x, y)
+    for time in (0.75, 1.0, 1.25, 1.5, 1.75, 2.0):
+        log.add(time, "communication", 0, 0, 1.0)
+    log.add(2.0, "collision", 0, -1, 3, 2, 0, other=1)
+    log.add(4.0, "charge_request", 0, -1, 85, 1, 0)
+    log.add(5.0, "charge_start", 0, -1, 85, 1, 0)
+    log.add(6.0, "charge_end", 0, -1, 90, 1, 0)
+    # It stands; that it is kept from the edge of the grid is no matter of the other UAV.
+    for slot in range(3):
+        log.add(float(slot), "move", 1, -1, 90, 0, 0)
+    log.add(2.0, "collision", 1, -1, 0, 0, 0, other=-1)
+    log.add(3.0, "landing", 1, -1, 90, 0, 0)
+    for uav in range(2):
+        log.add(6.0, "mission_end", uav, -1, 90, uav, 0)
+    shares = share_of_activities(log.columns(), scenario) * 12
+    expected = {SERVES: 1.5, FLIES: 0.5 + 1, KEPT: 1, WAITS: 1, CHARGES: 1, STANDS: 3 + 3}
+    assert shares.to_dict() == pytest.approx(expected)
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """A fleet of two UAVs, to which one more brings nothing: less is collected."""
+    folder = tmp_path_factory.mktemp("falls")
+    scenario = write_scenario(folder, **BUSY)
+    question = sweep_question(
+        {"uavs": (2,)},
+        scenario,
+        ["greedy"],
+        10,
+        prices={"uav": 20_000},
+        requirements={"success": 0.6},
+        folder=folder,
+    )
+    found = question.ask()
+    around.question_around(found, str(scenario), 30).ask()
+    return found
+
+
+def test_the_page_and_the_terminal_say_why_one_more_uav_collects_less(searched):
+    changed_results = around.load_around(searched)
+    ratios = changed_results.missions.groupby("point")["collection_ratio"].mean()
+    assert ratios[1] < ratios[0]
+    (fall,) = [fall for fall in falls.find_falls(searched) if fall.fleet == "3 UAVs"]
+    for shares in (fall.shares, fall.shares_before):
+        assert len(shares) == falls.MISSIONS
+        np.testing.assert_allclose(shares.sum(axis=1), 1)
+    # The third one does not collect what it costs the others.
+    before = fall.shares_before[SERVES].mean()
+    assert fall.shares[SERVES].mean() < before
+    text = fall.sentence()
+    assert text.startswith("With 3 UAVs instead of 2 UAVs, the collection ratio is lower")
+    assert f"{SERVES} for {fall.shares[SERVES].mean():.1%} of its time".replace("%", " %") in text
+    assert f" instead of {before:.1%}".replace("%", " %") in text
+    assert "due to the policy greedy and its return guard, not to the fleet" in text
+    assert text in brief_sentences(searched)
+    folder = str(searched.store.folder)
+    said = said_by(make_study_report(load_results(folder)), results=folder)
+    assert text in said
+    assert "What a UAV does with its time in the fleet of the answer and with 3 UAVs" in said
+
+
+def test_nothing_is_said_where_no_neighbour_collects_less(searched, monkeypatch):
+    """The same missions, with those of one more UAV that collect a little more."""
+    changed_results = around.load_around(searched)
+    missions = changed_results.missions.copy()
+    is_fleet = missions["point"] == 0
+    of_fleet = missions.loc[is_fleet, "collection_ratio"].to_numpy()
+    for point in missions.loc[~is_fleet, "point"].unique():
+        missions.loc[missions["point"] == point, "collection_ratio"] = of_fleet + 0.001
+    better = replace(changed_results, missions=missions)
+    monkeypatch.setattr(around, "load_around", lambda _: better)
+    again = load_results(searched.store.folder)
+    assert falls.fall_sentences(again) == []
+    assert falls.draw_falls(again) == []
