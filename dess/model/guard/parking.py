@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import late_slots, usable_battery
+from dess.model.guard.battery import dearest_slot, late_slots, usable_battery
 from dess.model.guard.matching import is_tight, keeps_cell, match_zones
 from dess.model.guard.queues import (
+    KEPT,
     QUEUE,
     TURN,
     Plan,
@@ -125,7 +126,8 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         match_zones(mission, uavs, data, chart, memory.plan, reach)
         home = _choose(mission, uavs, i, chart, memory, reach)
         wait = _slots_for_others(mission, uavs, i, memory.plan.turns)
-        gives_way = np.int64(_leaves_cell(uavs[i], memory.plan.turns[i].zone, home, memory.plan))
+        zone = memory.plan.turns[i].zone
+        gives_way = np.int64(_leaves_cell(mission, uavs[i], zone, home, memory.plan))
         return Home(home.x, home.y, home.cells, wait, home.begins, gives_way)
     for zone in range(mission.zones):
         memory.plan.queues[zone].is_full = 0
@@ -155,17 +157,18 @@ def _slots_for_others(mission, uavs, i, turns):
 
 
 @inlined
-def _leaves_cell(u, zone, home, plan):
+def _leaves_cell(mission, u, zone, home, plan):
     """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one.
 
     One that has just been overruled on its way to such a cell stays where it is: a teammate wants
-    the same cell, and they would block each other.
+    the same cell, and they would block each other. So does one whose battery is nearly empty.
     """
     if u.zone < 0 or zone < 0:
         return False
     is_elsewhere = u.x != home.x or u.y != home.y
-    moves_on = plan.queues[zone].is_full and is_elsewhere and not u.overruled
-    return u.zone != zone or moves_on
+    kept = dearest_slot(mission) * (home.cells * u.slots_per_cell + 1 + KEPT)
+    moves_on = not u.overruled and usable_battery(mission, u) > kept
+    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere and moves_on)
 
 
 @inlined
