@@ -276,8 +276,8 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
     """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
 
     It is the one that is farthest from those that come later, so that it closes none of their ways.
-    The cell of a teammate that may leave it, one behind a parked teammate, or one out of reach is
-    taken if no other is left.
+    The cell of a teammate that may leave it, one behind a teammate, or one out of reach is taken if
+    no other is left.
     """
     u, turns = uavs[j], memory.plan.turns
     zone, best, way, most = turns[j].zone, -1, -1, -1
@@ -292,12 +292,28 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
             if turns[other].zone == zone and uavs[other].zone != zone:
                 farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
         is_occupied = memory.taken[cell] == _OCCUPIED and cells > 0
-        is_behind = cells > distance(chart, u.x, u.y, x, y)
+        is_behind = cells > distance(chart, u.x, u.y, x, y) or _is_behind(uavs, j, chart, x, y)
         if is_occupied or is_behind or spent >= usable_battery(mission, u):
             farthest = 0
         if best < 0 or farthest > most or (farthest == most and cells < way):
             best, way, most = cell, cells, farthest
     return best, way
+
+
+@inlined
+def _is_behind(uavs, j, chart, x, y):
+    """Whether a UAV that is in a zone may have to pass a teammate there to get to a cell."""
+    u = uavs[j]
+    if u.zone < 0:
+        return False
+    for k in range(len(uavs)):
+        o = uavs[k]
+        if k == j or not o.active or o.zone != u.zone:
+            continue
+        past = distance(chart, u.x, u.y, o.x, o.y) + distance(chart, o.x, o.y, x, y)
+        if past == distance(chart, u.x, u.y, x, y):
+            return True
+    return False
 
 
 @inlined
