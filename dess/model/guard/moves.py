@@ -231,7 +231,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
-        if least > 0 and has_consumption(mission):
+        if least > 0 and (has_consumption(mission) or is_tight(mission, chart)):
             return _nearer_to_zone(chart, u, nearest & clear)
         return nearest & clear
     if least > 0 and clear & in_time:

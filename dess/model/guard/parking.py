@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import late_slots, usable_battery
+from dess.model.guard.battery import dearest_slot, late_slots, usable_battery
 from dess.model.guard.matching import is_tight, keeps_cell, match_zones
 from dess.model.guard.queues import (
+    KEPT,
     QUEUE,
     TURN,
     Plan,
@@ -124,8 +125,10 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
             return _choose(mission, uavs, i, chart, memory, reach)
         match_zones(mission, uavs, data, chart, memory.plan, reach)
         home = _choose(mission, uavs, i, chart, memory, reach)
-        gives_way = np.int64(_leaves_cell(uavs[i], memory.plan.turns[i].zone, home, memory.plan))
-        return Home(home.x, home.y, home.cells, home.wait, home.begins, gives_way)
+        wait = _slots_for_others(mission, uavs, i, memory.plan.turns)
+        zone = memory.plan.turns[i].zone
+        gives_way = np.int64(_leaves_cell(mission, uavs[i], zone, home, memory.plan))
+        return Home(home.x, home.y, home.cells, wait, home.begins, gives_way)
     for zone in range(mission.zones):
         memory.plan.queues[zone].is_full = 0
     wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
@@ -134,12 +137,38 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
 
 
 @inlined
-def _leaves_cell(u, zone, home, plan):
-    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one."""
+def _slots_for_others(mission, uavs, i, turns):
+    """The slots that a UAV keeps for teammates that come to its zone at the same time or sooner.
+
+    Those are the ones that are in the air and can spare no more battery than it. In missions that
+    go on in the air, the margin has slots for all teammates.
+    """
+    count = np.int64(0)
+    zone = turns[i].zone
+    if zone < 0 or not lands(mission) or keeps_cell(mission, uavs[i]):
+        return count
+    spare = usable_battery(mission, uavs[i]) - turns[i].spent[zone]
+    for j in range(mission.uavs):
+        if j == i or turns[j].zone != zone or keeps_cell(mission, uavs[j]):
+            continue
+        if usable_battery(mission, uavs[j]) - turns[j].spent[zone] <= spare:
+            count += 1
+    return count * uavs[i].slots_per_cell
+
+
+@inlined
+def _leaves_cell(mission, u, zone, home, plan):
+    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one.
+
+    One that has just been overruled on its way to such a cell stays where it is: a teammate wants
+    the same cell, and they would block each other. So does one whose battery is nearly empty.
+    """
     if u.zone < 0 or zone < 0:
         return False
     is_elsewhere = u.x != home.x or u.y != home.y
-    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere)
+    kept = dearest_slot(mission) * (home.cells * u.slots_per_cell + 1 + KEPT)
+    moves_on = not u.overruled and usable_battery(mission, u) > kept
+    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere and moves_on)
 
 
 @inlined
@@ -247,7 +276,8 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
     """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
 
     It is the one that is farthest from those that come later, so that it closes none of their ways.
-    The cell of a teammate that may leave it, or one out of reach, is taken if no other is left.
+    The cell of a teammate that may leave it, one behind a teammate, or one out of reach is taken if
+    no other is left.
     """
     u, turns = uavs[j], memory.plan.turns
     zone, best, way, most = turns[j].zone, -1, -1, -1
@@ -262,11 +292,28 @@ def _deepest_free(mission, uavs, j, later, chart, memory, reach):
             if turns[other].zone == zone and uavs[other].zone != zone:
                 farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
         is_occupied = memory.taken[cell] == _OCCUPIED and cells > 0
-        if is_occupied or spent >= usable_battery(mission, u):
+        is_behind = cells > distance(chart, u.x, u.y, x, y) or _is_behind(uavs, j, chart, x, y)
+        if is_occupied or is_behind or spent >= usable_battery(mission, u):
             farthest = 0
         if best < 0 or farthest > most or (farthest == most and cells < way):
             best, way, most = cell, cells, farthest
     return best, way
+
+
+@inlined
+def _is_behind(uavs, j, chart, x, y):
+    """Whether a UAV that is in a zone may have to pass a teammate there to get to a cell."""
+    u = uavs[j]
+    if u.zone < 0:
+        return False
+    for k in range(len(uavs)):
+        o = uavs[k]
+        if k == j or not o.active or o.zone != u.zone:
+            continue
+        past = distance(chart, u.x, u.y, o.x, o.y) + distance(chart, o.x, o.y, x, y)
+        if past == distance(chart, u.x, u.y, x, y):
+            return True
+    return False
 
 
 @inlined
