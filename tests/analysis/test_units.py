@@ -103,9 +103,9 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
     cost = f"for {best.cost:,.0f} EUR a year {ends}"
     assert f"{cost}: {parts['purchase']:,.0f} EUR for the purchase" in text
     of_missions = f"(battery packs {parts['packs']:,.0f} EUR, hours {parts['hours']:,.0f} EUR"
-    assert f"{of_missions} and lost UAVs 0 EUR)" in text
+    assert f"{of_missions} and lost UAVs 0.00 EUR)" in text
     assert "for 200 missions (" in text
-    assert f"{best.cost / gb:,.0f} EUR per GB collected" in text
+    assert f"{best.cost / gb / 1000:,.2f} EUR per MB collected" in text
     assert f"; to buy it costs {2 * parts['purchase']:,.0f} EUR." in text
     assert "paid off over 2 years at 0 % interest; the fleet makes 200 missions a year" in (
         " ".join(answer.answers())
