@@ -136,6 +136,49 @@ def unreachable_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
     return _reach_in_words(*min(limited, key=lambda pair: pair[1].largest_ratio))
 
 
+def scenario_notes(spaces: Iterable[ScenarioSpace]) -> list[str]:
+    """Which nodes no UAV can serve, and which zones have no room for all UAVs."""
+    known = [*spaces]
+    return [*unreachable_sentences(known), *small_zone_sentences(known)]
+
+
+def small_zone_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
+    """Which zones have too few cells for the largest fleet of scenarios, so that UAVs may be lost.
+
+    In the air, the aim of the return guard needs room for all UAVs at pads: two for each pad, of
+    which one waits. A zone does not have room for more UAVs than it has cells. On the ground, a
+    wait takes no battery.
+    """
+    crowded = [space for space in spaces if _lacks_room(space)]
+    if not crowded:
+        return []
+    space = max(crowded, key=lambda space: space.uavs[1])
+    rooms, sizes = _rooms_at_pads(space), space.chart.sizes
+    small = [
+        f"zones.{zone - 1} has {numbers.format_count(int(sizes[zone]), 'cell')}"
+        for zone in range(1, len(rooms))
+        if rooms[zone] < 2 * space.zone_pads[zone]
+    ]
+    room = numbers.format_count(sum(rooms), "UAV")
+    return [
+        f"UAVs may be lost: the pads have room for {room}, and up to {space.uavs[1]} fly, as "
+        f"{listed(small)}; give more cells or pads, or landing = true"
+    ]
+
+
+def _rooms_at_pads(space: ScenarioSpace) -> list[int]:
+    """How many UAVs each zone has room for that take turns at its pads."""
+    pairs = zip(space.zone_pads, space.chart.sizes, strict=True)
+    return [min(2 * pads, int(cells)) for pads, cells in pairs]
+
+
+def _lacks_room(space: ScenarioSpace) -> bool:
+    """Whether zones with more cells would have room for all UAVs, and these have not."""
+    fleet = space.uavs[1]
+    needs_room = not space.landing and space.flight_cost > 0
+    return needs_room and sum(_rooms_at_pads(space)) < fleet <= 2 * space.charging_pads
+
+
 def _reach_key(space: ScenarioSpace) -> Any:
     """What the nodes that UAVs can serve depend on; a sweep has many scenarios that share it."""
     sea = (space.size, space.rectangles, space.no_fly, space.nodes, space.path_loss_exponent)

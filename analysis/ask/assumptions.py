@@ -7,7 +7,7 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import battery_sentence, type_sentences, unreachable_sentences
+from dess.analysis.sheet import battery_sentence, scenario_notes, type_sentences
 from dess.physics.fleet import IN_UNITS
 from dess.scenario.data_sheet import LORA, DataSheet
 from dess.scenario.quantities import printed
@@ -73,7 +73,7 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         f"{given('bandwidth', '')} with {_rates_of(space, varied)}{duty}.",
         *(
             f"{line[0].upper()}{line[1:]}."
-            for line in unreachable_sentences(results.store.manifest.scenarios)
+            for line in scenario_notes(results.store.manifest.scenarios)
         ),
         f"Wind: {given('wind', 'none')}, the same everywhere and always. "
         f"{_battery_of(space, varied)}",

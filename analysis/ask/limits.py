@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from dess import InputError, simulate_batch
+from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
@@ -32,6 +32,7 @@ from dess.analysis.stats.intervals import values_within, worst_node
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
 from dess.base.files.writing import write_file
+from dess.model.events import Event
 from dess.model.record import Records
 from dess.policies.registry import is_path, load_team
 from dess.scenario.quantities import POINTS, measured, rounded, times, unit_of
@@ -45,6 +46,7 @@ PLACES = POINTS[::2]  # from which the wind comes
 FAILURES = 1 / 100_000, 1.0  # the rarest and the most frequent that are tried [1/h of flying]
 SHEET = "sheet"  # what ends a condition that the data sheet does not allow to be harder
 
+_LOST = 8  # missions with a lost UAV that are looked at for the place of the loss
 _RAREST = 1e-8  # failures that never happen [1/h of flying]
 _MORE_FAILURES = 3  # times as many as those that are borne
 _MORE_MISSIONS = 3  # times as many for failures
@@ -66,6 +68,8 @@ class Limit(Document):
         last: The hardest value with which the fleet was found to meet its requirements, rounded to
             what the missions tell.
         is_rough: Whether they tell but one digit of it.
+        small_zone: Where the success breaks, the zone with fewer cells than UAVs at which they are
+            lost, in words; empty if not all are lost at such zones.
         harder: How many times as hard as at present this is; 0 if the scenario has no value.
         broken: The metric of the requirement that breaks beyond it; ``sheet`` if the data sheet
             allows no more, and empty if none breaks up to the hardest value that was tried.
@@ -77,6 +81,7 @@ class Limit(Document):
     harder: float
     broken: str
     is_rough: bool = False
+    small_zone: str = ""
 
 
 class Limits(Document):
@@ -389,6 +394,29 @@ class _Fleet:
             trials[number] = self.trial_of(_table_of(space, records))
         return trials
 
+    def small_zone_of_losses(self, change: dict[str, Any]) -> str:
+        """The zone with fewer cells than UAVs at which a change loses UAVs, in words.
+
+        It is empty if some UAV is lost nearer to a zone with a cell for each, or none is lost.
+        """
+        space = self.load(change)
+        sizes = space.chart.sizes
+        uavs = space.uavs[1]
+        if sizes.min() >= uavs:
+            return ""
+        [records] = self._fly_all([space], self.missions)
+        lost = np.flatnonzero(records.uavs["down"].any(axis=1))[:_LOST]
+        zones = set()
+        for number in lost:
+            log = simulate(space, self._team, self._seed, CHECK + int(number), events=True).events
+            assert log is not None
+            zones |= {_nearest_zone(space, row) for row in log if row.event == "battery_empty"}
+        if not zones or any(sizes[zone] >= uavs for zone in zones):
+            return ""
+        zone = min(zones)
+        cells = numbers.format_count(int(sizes[zone]), "cell")
+        return f"zones.{zone - 1}, which has {cells} for {uavs} UAVs"
+
     def _fly_all(self, spaces: Sequence[ScenarioSpace], missions: int) -> list[Records]:
         """The first missions of the check in each of these scenarios."""
         records = simulate_batch(
@@ -433,6 +461,13 @@ class _Fleet:
         return margins
 
 
+def _nearest_zone(space: ScenarioSpace, event: Event) -> int:
+    """The number of the zone that is nearest to the place of an event."""
+    chart = space.chart
+    x, y = chart.parking[chart.nearest[int(event.y), int(event.x)]]
+    return int(chart.zones[y, x])
+
+
 def _table_of(space: ScenarioSpace, records: Records) -> pd.DataFrame:
     """The metrics of missions, in the units of the data sheet."""
     assert space.units
@@ -449,10 +484,13 @@ def _find_most_data(fleet: _Fleet, rate: str | tuple[str, ...]) -> Limit:
             return times(rate, factor)
         return [times(rate_of_node, factor) for rate_of_node in rate]
 
+    def change(factor: float) -> dict[str, Any]:
+        return {"data_sheet.data_rate": multiply(factor)}
+
     search = Bisection(1.0, MOST_DATA)
     trials = {}
     while (factor := search.value) is not None:
-        [trials[factor]] = fleet.try_changes([{"data_sheet.data_rate": multiply(factor)}])
+        [trials[factor]] = fleet.try_changes([change(factor)])
         search.learn(factor, trials[factor].broken)
     digits = _digits_of_limit(trials, search.broken)
     present = "what the sheet lists"
@@ -462,6 +500,9 @@ def _find_most_data(fleet: _Fleet, rate: str | tuple[str, ...]) -> Limit:
         last = max(rate, rounded(multiply(search.low), digits), key=_bits_per_second)
     elif search.low > 1:
         last = f"{rounded(f'{search.low:g} times', digits)} what the sheet lists"
+    small_zone = ""
+    if search.broken == "success":
+        small_zone = fleet.small_zone_of_losses(change(search.high))
     return Limit(
         field="data_sheet.data_rate",
         present=present,
@@ -469,6 +510,7 @@ def _find_most_data(fleet: _Fleet, rate: str | tuple[str, ...]) -> Limit:
         harder=search.low,
         broken=search.broken,
         is_rough=digits == 1,
+        small_zone=small_zone,
     )
 
 
@@ -481,6 +523,10 @@ def _find_strongest_wind(fleet: _Fleet) -> Limit:
 
     It is no stronger than what UAVs can fly in from all of them.
     """
+
+    def wind(speed: float, place: str) -> dict[str, Any]:
+        return {"data_sheet.wind": f"{speed:g} m/s from {place}"}
+
     sheet = fleet.space.data_sheet
     strongest = {
         place: sheet.strongest_wind(360 / len(PLACES) * number)
@@ -491,7 +537,7 @@ def _find_strongest_wind(fleet: _Fleet) -> Limit:
     places = PLACES
     trials = {}
     while (speed := search.value) is not None:
-        winds = [{"data_sheet.wind": f"{speed:g} m/s from {place}"} for place in places]
+        winds = [wind(speed, place) for place in places]
         found = dict(zip(places, fleet.try_changes(winds), strict=True))
         hardest = min(places, key=lambda place: found[place].room)
         trials[speed] = found[hardest]
@@ -508,6 +554,9 @@ def _find_strongest_wind(fleet: _Fleet) -> Limit:
     if sheet.wind:
         present, _ = measured(sheet.wind, "m/s from deg")
         harder = search.low / max(present, 0.01)
+    small_zone = ""
+    if search.broken == "success":
+        small_zone = fleet.small_zone_of_losses(wind(search.high, worst))
     return Limit(
         field="data_sheet.wind",
         present=sheet.wind or "",
@@ -515,6 +564,7 @@ def _find_strongest_wind(fleet: _Fleet) -> Limit:
         harder=harder,
         broken=search.broken or SHEET,
         is_rough=digits == 1,
+        small_zone=small_zone,
     )
 
 
@@ -669,6 +719,8 @@ def _limit_in_words(limit: Limit) -> str:
         end = "in more wind from there, the UAVs of the data sheet cannot fly"
     elif limit.broken:
         end = f"beyond it, the {metric_of(limit.broken).within} breaks its requirement"
+        if limit.small_zone:
+            end = f"{end}, as UAVs are lost at {limit.small_zone}"
     else:
         end = "no more was tried"
     return f"{bears} ({assumed}); {end}"

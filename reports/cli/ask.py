@@ -197,7 +197,7 @@ def _run_question(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
-    options.note_unreachable(study.scenarios)
+    options.note_limits(study.scenarios)
     results = run_or_exit(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),

@@ -88,7 +88,7 @@ def show_scenario(
         figure: Draw the map of the sea into this file, also if its nodes or zones are refused.
     """
     from dess.analysis.names import declared_fields
-    from dess.analysis.sheet import sheet_facts, sheet_lines
+    from dess.analysis.sheet import sheet_facts, sheet_lines, small_zone_sentences
     from dess.scenario.consistency import distance_error, distance_sentence
     from dess.scenario.scenario import draft_scenario, scenario_description
 
@@ -101,6 +101,7 @@ def show_scenario(
             save_figure(sea_figure(sea), temporary, figure.suffix[1:])
     space = load_space(name, settings)
     description = scenario_description(name)
+    notes = small_zone_sentences([space])
     if as_json:
         rows = [field._asdict() for field in declared_fields(space)]
         shown: dict[str, Any] = {"scenario": name, "description": description, "fields": rows}
@@ -109,6 +110,8 @@ def show_scenario(
             shown["follows"] = sheet_facts(space)
         if space.centre:
             shown["distance_error"] = distance_error(space)
+        if notes:
+            shown["notes"] = notes
         print(json.dumps(shown, indent=2))
         return
     if description:
@@ -119,6 +122,8 @@ def show_scenario(
             console.print_text(line)
     if space.centre:
         console.print_text(distance_sentence(space))
+    for note in notes:
+        console.print_text(note)
     if everything:
         for f in declared_fields(space):
             default = "no default"

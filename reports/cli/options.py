@@ -133,11 +133,11 @@ def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") 
         print_text(f"note: {line}", sys.stderr)
 
 
-def note_unreachable(spaces: "Iterable[ScenarioSpace]") -> None:
-    """Say on stderr which nodes no UAV can serve, and what ratio is possible without them."""
-    from dess.analysis.sheet import unreachable_sentences
+def note_limits(spaces: "Iterable[ScenarioSpace]") -> None:
+    """Say on stderr which nodes no UAV can serve, and which zones have no room for all UAVs."""
+    from dess.analysis.sheet import scenario_notes
 
-    for line in unreachable_sentences(spaces):
+    for line in scenario_notes(spaces):
         print_text(f"note: {line}", sys.stderr)
 
 

@@ -1,8 +1,14 @@
 """What is told of nodes that no UAV can serve: before a sweep, and in its answer."""
 
-from dess import ScenarioSpace, analysis
-from dess.analysis.sheet import unreachable_sentences
-from dess.reports.cli.options import note_unreachable
+import json
+from typing import Any
+
+import pytest
+
+from dess import ScenarioSpace, analysis, load_scenario
+from dess.analysis.sheet import scenario_notes, unreachable_sentences
+from dess.reports.cli import main
+from dess.reports.cli.options import note_limits
 from tests.dess.model.test_reach import SHEET
 
 NODES = {"nodes": [[3, 0], [55, 0], [60, 0]], "names": ["near", "between", "far"]}
@@ -26,7 +32,7 @@ def test_of_several_fleets_the_one_that_reaches_least_is_told(capsys):
         "beyond the margins that the return guard keeps for 2 UAVs: between",
         "without these nodes a collection ratio of 33.3 % is the highest",
     ]
-    note_unreachable(_spaces(1, 2))
+    note_limits(_spaces(1, 2))
     assert capsys.readouterr().err == "".join(f"note: {line}\n" for line in sentences)
     assert unreachable_sentences([ScenarioSpace.of()]) == []
 
@@ -41,3 +47,39 @@ def test_an_answer_tells_it_too(tmp_path):
         "Beyond the margins that the return guard keeps for 2 UAVs: between.",
         "Without these nodes a collection ratio of 33.3 % is the highest.",
     ]
+
+
+def _crowded(**fields: Any) -> ScenarioSpace:
+    """A further zone of one cell, and pads in both zones that are enough for 4 UAVs in number."""
+    zones = [{"cells": [9, 9, 1, 1], "pads": 1}]
+    return load_scenario("paper", **({"uavs": 4, "pads": 1, "zones": zones} | fields))
+
+
+def test_a_zone_without_room_for_all_uavs_is_told(tmp_path, capsys):
+    told = (
+        "UAVs may be lost: the pads have room for 3 UAVs, and up to 4 fly, as zones.0 has 1 cell; "
+        "give more cells or pads, or landing = true"
+    )
+    assert scenario_notes([_crowded(uavs=3), _crowded()]) == [told]
+    note_limits([_crowded()])
+    assert capsys.readouterr().err == f"note: {told}\n"
+    (tmp_path / "sea.toml").write_text(_crowded().to_toml())
+    assert main(["scenarios", "show", str(tmp_path / "sea.toml")]) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    assert main(["scenarios", "show", str(tmp_path / "sea.toml"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["notes"] == [told]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"uavs": 3},
+        {"landing": True},  # a wait on the ground takes no battery
+        {"pads": 2},
+        {"zones": [{"cells": [9, 9, 2, 1], "pads": 1}]},
+        {"uavs": 5},  # no number of cells would be enough for these pads
+        {"flight_cost": 0},
+    ],
+)
+def test_other_zones_are_not_told(fields):
+    assert scenario_notes([_crowded(**fields)]) == []

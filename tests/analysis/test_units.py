@@ -27,6 +27,7 @@ from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
 from dess.analysis.names import declared_fields, field_named
 from dess.analysis.study.cheapest import Cheapest, Setting
 from dess.analysis.study.study import CHECK
+from dess.model.state import EAST, SOUTH
 from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.small import SCENARIO, SHEET, write_scenario
@@ -402,6 +403,9 @@ ROUGH = limit("wind", "8 m/s from SW", "7 m/s from SE", 0.9, "age").model_copy(
     update={"is_rough": True}
 )
 FAILURES = limit("mtbf", "", "", 0.0, "success")
+SMALL = limit("data_rate", "2 kB/h", "8.8 kB/h", 4.4, "success").model_copy(
+    update={"small_zone": "zones.0, which has 1 cell for 2 UAVs"}
+)
 
 
 @pytest.mark.parametrize(("found", "start", "end"), [
@@ -424,6 +428,12 @@ FAILURES = limit("mtbf", "", "", 0.0, "success")
         "Wind was not asked: the sheet has no max_speed.",
     ),
     (
+        (SMALL,),
+        "What breaks it first is the data: up to 8.8 kB/h (2 kB/h is assumed); beyond it, the "
+        "success breaks its requirement, as UAVs are lost at zones.0, which has 1 cell for 2 UAVs.",
+        "Wind was not asked: the sheet has no max_speed.",
+    ),
+    (
         (FAILURES,),
         "What breaks it first is failures: not even one every 100000 h of a UAV's flying (none is "
         "assumed); beyond it, the success breaks its requirement.",
@@ -437,6 +447,37 @@ def test_limits_are_told_in_sentences(found, start, end, monkeypatch):
     assert first.startswith(start)
     assert last == end
     assert [*found] == sorted([*found][::-1], key=limits._order_of)
+
+
+class _Onward:
+    """All UAVs take one action, and none ever charges."""
+
+    name = "onward"
+
+    def __init__(self, action):
+        self.action = action
+
+    def act(self, view):
+        return np.full(len(view), self.action)
+
+
+@pytest.mark.parametrize(
+    ("action", "cells", "told"),
+    [
+        (EAST, 1, "zones.0, which has 1 cell for 2 UAVs"),
+        (EAST, 2, ""),  # there is a cell for each
+        (SOUTH, 1, ""),  # they are lost beside the start zone
+    ],
+)
+def test_a_limit_names_the_small_zone_at_which_uavs_are_lost(action, cells, told, monkeypatch):
+    zones = [{"cells": [60, 0, cells, 1], "pads": 1}]
+    sea = {"grid": 64, "rows": 8, "zone": [0, 0, 2, 1], "nodes": [[30, 0]], "zones": zones}
+    fleet = object.__new__(limits._Fleet)
+    known = {"missions": 3, "_team": _Onward(action), "_seed": 1, "_workers": 1, "_progress": None}
+    for name, value in known.items():
+        monkeypatch.setattr(fleet, name, value, raising=False)
+    monkeypatch.setattr(fleet, "load", lambda change: load_scenario("paper", **sea, **change))
+    assert fleet.small_zone_of_losses({"uavs": 2}) == told
 
 
 def test_the_risk_is_told_of_the_missions_of_the_check(searched):
