@@ -6,15 +6,17 @@ draw_falls(results)
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
-from dess.analysis.metrics import RATIO, metric_of
+from dess.analysis.metrics import NODE_RATIOS, RATIO, metric_of
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import compare, differences_of, t_test
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import (
@@ -42,6 +44,10 @@ class Fall:
         is_certain: Whether a rare failure is ruled out as its cause.
         shares: (MISSIONS, activities) the shares of time.
         shares_before: The same of the fleet, in the same missions.
+        nodes: (K,) the mean share of the data of each node that is collected; none in results of
+            earlier versions.
+        nodes_before: The same of the fleet.
+        titles: What the nodes are called.
     """
 
     fleet: str
@@ -51,6 +57,9 @@ class Fall:
     is_certain: bool
     shares: pd.DataFrame
     shares_before: pd.DataFrame
+    nodes: np.ndarray
+    nodes_before: np.ndarray
+    titles: list[str]
 
     def sentence(self) -> str:
         """How much less is collected, what the UAVs do instead, and whose fault it is."""
@@ -61,9 +70,21 @@ class Fall:
             doubt = f" in what was seen ({NOT_RULED_OUT})"
         return (
             f"With {self.fleet} instead of {self.before}, the {metric.within} is lower{doubt}, by "
-            f"{change} points: {self._changes_of_time()}. This is due to the policy "
-            f"{self.policy} and its return guard, not to the fleet: it could do as well as the "
+            f"{change} points: {self._changes_of_time()}. {self._worst_node()}This is due to "
+            f"the policy {self.policy} and its return guard, not to the fleet: it could do as well as the "
             "smaller one if what is added stayed unused."
+        )
+
+    def _worst_node(self) -> str:
+        """The node that loses most, in a sentence with a space behind it."""
+        if not len(self.nodes):
+            return ""
+        node = int((self.nodes - self.nodes_before).argmin())
+        share = numbers.format_percent(self.nodes[node])
+        share_before = numbers.format_percent(self.nodes_before[node])
+        return (
+            f"The node that loses most is {self.titles[node]}, from {share_before} to {share} of "
+            "its data. "
         )
 
     def _changes_of_time(self) -> str:
@@ -120,6 +141,9 @@ def _compare_neighbours(results: Results) -> list[Fall]:
                 is_certain=verdict == BELOW,
                 shares=_measure_shares(changed_results, point),
                 shares_before=_measure_shares(changed_results, 0),
+                nodes=_mean_ratios_of_nodes(changed_results, point),
+                nodes_before=_mean_ratios_of_nodes(changed_results, 0),
+                titles=node_titles(space, range(len(space.nodes))),
             )
         )
     return falls
@@ -160,6 +184,15 @@ def _change_back(change: dict[str, int]) -> dict[str, int]:
     return {field: value - 1 for field, value in change.items()}
 
 
+def _mean_ratios_of_nodes(results: Results, point: int) -> np.ndarray:
+    """(K,) the mean share of the data of each node that is collected at a design point."""
+    missions = results.missions[results.missions["point"] == point]
+    if NODE_RATIOS not in missions:
+        return np.array([])
+    return np.asarray(np.mean([*missions[NODE_RATIOS]], axis=0))
+
+
+@compute_once  # the fleet is compared with each of its neighbours
 def _measure_shares(results: Results, point: int) -> pd.DataFrame:
     """The shares of time in the first missions of a design point, a row each."""
     policy = results.policies[0]

@@ -32,6 +32,8 @@ BUSY = {
     "data_sheet": {**SHEET["data_sheet"], "endurance": "20 min", "data_rate": "12 MB/h"},
 }
 
+DRAWN = "What a UAV does with its time in the fleet of the answer and with 3 UAVs and 2 pads"
+
 
 def test_the_shares_of_a_small_mission_are_those_by_hand(tmp_path):
     """Two UAVs in six slots, of which the second one lands after three."""
@@ -50,7 +52,7 @@ def test_the_shares_of_a_small_mission_are_those_by_hand(tmp_path):
     log.add(4.0, "charge_request", 0, -1, 85, 1, 0)
     log.add(5.0, "charge_start", 0, -1, 85, 1, 0)
     log.add(6.0, "charge_end", 0, -1, 90, 1, 0)
-    # It stands; that it is kept from the edge of the grid is no matter of the other UAV.
+    # It stands. That the edge of the grid stops it does not count: no other UAV keeps it.
     for slot in range(3):
         log.add(float(slot), "move", 1, -1, 90, 0, 0)
     log.add(2.0, "collision", 1, -1, 0, 0, 0, other=-1)
@@ -81,7 +83,7 @@ def searched(tmp_path_factory):
     return found
 
 
-def test_the_page_and_the_terminal_say_why_one_more_uav_collects_less(searched):
+def test_an_answer_says_why_one_more_uav_collects_less(searched):
     changed_results = around.load_around(searched)
     ratios = changed_results.missions.groupby("point")["collection_ratio"].mean()
     assert ratios[1] < ratios[0]
@@ -96,12 +98,29 @@ def test_the_page_and_the_terminal_say_why_one_more_uav_collects_less(searched):
     assert text.startswith("With 3 UAVs instead of 2 UAVs, the collection ratio is lower")
     assert f"{SERVES} for {fall.shares[SERVES].mean():.1%} of its time".replace("%", " %") in text
     assert f" instead of {before:.1%}".replace("%", " %") in text
+    missions = changed_results.missions
+    before, now = (
+        np.mean([*missions.loc[missions["point"] == point, "node_ratios"]], axis=0)
+        for point in (0, 1)
+    )
+    node = np.argmin(now - before)
+    x, y = BUSY["nodes"][node]
+    named = f"The node that loses most is [{x}, {y}], from {before[node]:.1%} to {now[node]:.1%}"
+    assert named.replace("%", " %") in text
     assert "due to the policy greedy and its return guard, not to the fleet" in text
     assert text in brief_sentences(searched)
+    (drawing,) = falls.draw_falls(searched)
+    assert DRAWN in drawing.caption
+    bars = drawing.figure.axes[0].patches
+    assert sum(bar.get_width() for bar in bars) == pytest.approx(3)  # of the fleet, UAV and pad
+
+
+@pytest.mark.slow
+def test_the_page_says_and_draws_why_one_more_uav_collects_less(searched):
     folder = str(searched.store.folder)
     said = said_by(make_study_report(load_results(folder)), results=folder)
-    assert text in said
-    assert "What a UAV does with its time in the fleet of the answer and with 3 UAVs" in said
+    for text in (DRAWN, *falls.fall_sentences(searched)):
+        assert text in said
 
 
 def test_nothing_is_said_where_no_neighbour_collects_less(searched, monkeypatch):
