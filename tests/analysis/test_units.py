@@ -485,7 +485,7 @@ def test_the_risk_is_told_of_the_missions_of_the_check(searched):
     checks = searched.checks[searched.checks["point"] == best.points[0]]
     text = risk_sentence(searched, best.policy, best.points)
     assert text.startswith("In 0 of 20 missions that check it, a UAV is lost; in the worst tenth")
-    assert f"the data are {checks['age_h'].quantile(0.9):.4g} h old or older." in text
+    assert f"the data are {60 * checks['age_h'].quantile(0.9):.4g} min old or older." in text
     assert brief_sentences(searched)[0] == text
 
 

@@ -61,7 +61,7 @@ def test_the_worst_node_and_the_oldest_age_are_requirements_like_others(tmp_path
     assert row[LEAST] == pytest.approx(np.mean([*checks[NODE_RATIOS]], axis=0).min())
     sentence = best.estimates_sentence()
     assert "its collection ratio of the worst node is" in sentence
-    assert "(at least 20 % required)" in sentence and "(at most 1 h required)" in sentence
+    assert "(at least 20 % required)" in sentence and "(at most 60 min required)" in sentence
     assert "hardly" not in best.choice_sentence()
     assert "at least 0.195 and a mean age of the oldest node of" in answer.guarantee
     find_limits(answer.results, str(scenario), missions=10)
