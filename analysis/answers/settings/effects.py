@@ -18,7 +18,7 @@ from dess.analysis.answers.settings.points import (
 from dess.analysis.metrics import (
     PRODUCT,
     Metric,
-    check_ranking_metric,
+    check_metric,
     metric_in_groups,
     metric_in_missions,
     metric_of,
@@ -119,7 +119,7 @@ def _average_labelled(
     cell_of = groups.ngroup().to_numpy()
     cells = labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
-    check_ranking_metric(metric, results.missions)
+    check_metric(metric, results.missions)
     missions = results.missions_of(policy)
     measure = metric_in_missions(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
