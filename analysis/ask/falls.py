@@ -71,8 +71,8 @@ class Fall:
         return (
             f"With {self.fleet} instead of {self.before}, the {metric.within} is lower{doubt}, by "
             f"{change} points: {self._changes_of_time()}. {self._worst_node()}This is due to "
-            f"the policy {self.policy} and its return guard, not to the fleet: it could do as well as "
-            "the smaller one if what is added stayed unused."
+            f"the policy {self.policy} and its return guard, not to the fleet: it could do as "
+            "well as the smaller one if what is added stayed unused."
         )
 
     def _worst_node(self) -> str:

@@ -116,6 +116,7 @@ def test_an_answer_says_why_one_more_uav_collects_less(searched):
 
 
 @pytest.mark.slow
+@pytest.mark.brief
 def test_the_page_says_and_draws_why_one_more_uav_collects_less(searched):
     folder = str(searched.store.folder)
     said = said_by(make_study_report(load_results(folder)), results=folder)
