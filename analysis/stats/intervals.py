@@ -65,7 +65,7 @@ def ends_of_means(
         level: Confidence level, or (...) levels.
 
     Returns:
-        (...) lower and (...) upper ends.
+        (...) lower and (...) upper ends, with low <= mean <= high.
     """
     rare = rare_values(metric, mean)
     if rare is None:
@@ -77,7 +77,10 @@ def ends_of_means(
         if not metric.is_bounded:
             low, high = (np.where(np.asarray(n) > 1, end, np.nan) for end in (low, high))
     least, most = metric.range
-    return np.clip(low, least, most), np.clip(high, least, most)
+    # A mean at an end of the range may lie beyond it by rounding.
+    low = np.minimum(np.clip(low, least, most), mean)
+    high = np.maximum(np.clip(high, least, most), mean)
+    return low, high
 
 
 def rare_values(metric: Metric, mean: Any) -> tuple[Any, Any] | None:

@@ -150,11 +150,16 @@ def _others_in_words(results: Results, others: pd.DataFrame, what: str) -> str:
     if 0 < len(tied) <= MOST_NAMES and len(others) > 1:
         names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
         as_good += f" ({'; '.join(names)})"
-    verb = "is" if len(others) == 1 else "are"
     seen = int((others["standing"] == SEEN_WORSE).sum())
+    verb = "are"
+    if len(others) == 1:
+        verb = "is"
+    verb_of_seen = "are"
+    if seen == 1:
+        verb_of_seen = "is"
     counts = {
         as_good: len(tied),
-        f"{verb} worse in what was seen, where {NOT_RULED_OUT}": seen,
+        f"{verb_of_seen} worse in what was seen, where {NOT_RULED_OUT}": seen,
         f"{verb} {worse}": int((others["standing"] == WORSE).sum()),
     }
     found = {words: count for words, count in counts.items() if count}

@@ -358,6 +358,13 @@ def test_the_interval_of_the_worst_node_holds_its_mean(draw, column):
         assert held >= 0.93
 
 
+def test_an_interval_holds_a_mean_that_rounding_puts_beyond_its_range():
+    metric = metric_for_length(OLDEST, 400, None)
+    beyond = np.nextafter(metric.most, np.inf)
+    found = interval_of(metric, np.full(50, beyond))
+    assert found.low <= found.mean <= found.high
+
+
 def test_the_interval_of_the_node_that_did_worst_does_not():
     metric = replace(metric_of(LEAST), among=NODES)
     assert coverage(equal_nodes, metric, 100, 200)[1] < 0.7

@@ -120,7 +120,7 @@ def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
     assert "the rest are significantly worse." in said
     seen = three.assign(standing=three["standing"].where(three["rank"] != 4, SEEN_WORSE))
     said = best_settings_sentence(results, seen, PRODUCT)
-    assert "1 are worse in what was seen, where a rare failure is not ruled out; the rest" in said
+    assert "1 is worse in what was seen, where a rare failure is not ruled out; the rest" in said
     all_seen = table.assign(tied=table["rank"] == 1, standing=SEEN_WORSE)
     said = best_settings_sentence(results, all_seen, PRODUCT)
     assert "All 11 others are worse in what was seen, where a rare failure is not ruled" in said
