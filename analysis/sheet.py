@@ -11,7 +11,7 @@ from dess.model.channel import efficiency, mean_snr_at
 from dess.model.reach import Reach, reach_of_nodes
 from dess.model.state import ACTION_NAMES, constants_of
 from dess.physics.arrivals import MOST_MESSAGES
-from dess.physics.consumption import PERCENT
+from dess.physics.energy import PERCENT
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import Constants, ScenarioSpace
 

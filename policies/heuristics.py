@@ -25,10 +25,9 @@ from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
 from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
-from dess.model.ways_home import reach_of
 from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
-from dess.physics.consumption import has_consumption
+from dess.physics.energy import has_costs
 from dess.physics.landing import flies
 
 # The numbers of the policies in compiled code.
@@ -78,7 +77,7 @@ class _Heuristic:
             circuit = plan_circuit(nodes, chart)
         return _choose_actions(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
-            *chart, reach_of(state.missions, chart), view.mission, view.uav,
+            *chart, view.ways.reach, view.mission, view.uav,
         )  # fmt: skip
 
 
@@ -283,11 +282,8 @@ def _choose_goal(
 
 @inlined
 def _is_too_late(mission, u, chart, x, y):
-    """Whether UAV ``u`` would not come home from a cell before the mission ends on the ground.
-
-    Where a slot takes one percent of the battery, this says so as well.
-    """
-    if not has_consumption(mission):
+    """Whether UAV ``u`` would not come home from a cell before the mission ends on the ground."""
+    if not has_costs(mission):  # the battery says so as well
         return False
     slots = slots_of_round_trip(mission, u, chart, x, y)
     return late_slots(mission, slots + 1 + margin_slots(mission, u)) > 0

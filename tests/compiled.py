@@ -7,7 +7,7 @@ from dess.model import rules
 from dess.model.channel import empty_scratch
 from dess.model.guard import battery, matching, moves, parking, queues, ways
 from dess.model.state import SENSOR, STEP_X, STEP_Y
-from dess.model.ways_home import reach_of
+from dess.model.ways import Ways
 from dess.physics.chart import FAR, distance, is_open
 from dess.policies import heuristics
 
@@ -71,7 +71,7 @@ def distances(chart, x, y, to):
 
 
 def parking_cell(mission, uavs, i, chart, data=1e6):
-    reach = reach_of(np.array([mission]), chart)
+    reach = Ways(np.array([mission]), chart).reach
     memory = parking.parking_memory(chart, len(uavs))
     return _parking_cell(mission, uavs, i, data, chart, memory, reach)
 
@@ -83,7 +83,7 @@ def _parking_cell(mission, uavs, i, data, chart, memory, reach):
 
 def plan_of_pads(mission, uavs, i, chart, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
-    reach = reach_of(np.array([mission]), chart)
+    reach = Ways(np.array([mission]), chart).reach
     plan = queues.plan_memory(len(uavs))
     return plan, _plan_pads(mission, uavs, i, data, chart, plan, reach)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
-from dess.physics.wind import Wind
+from dess.physics.energy import Wind
 from dess.scenario.scenario import Scenario, ScenarioSpace
 from tests import compiled
 

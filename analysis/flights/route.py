@@ -14,7 +14,7 @@ import numpy as np
 
 from dess.analysis.flights.phases import Phase, Visit
 from dess.physics.chart import Cell
-from dess.physics.consumption import PERCENT
+from dess.physics.energy import PERCENT
 from dess.physics.fleet import type_of
 from dess.scenario.own_sea import Positions
 from dess.scenario.places import EARTH_RADIUS, Projection

@@ -11,10 +11,9 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.study.stopping import MOST, Line, StrictTable
 from dess.model.state import types_of
-from dess.physics.consumption import PERCENT
+from dess.physics.energy import PERCENT, energy_constants
 from dess.physics.fleet import slowest, type_of
 from dess.physics.section import Integer, Number
-from dess.physics.wind import constants
 from dess.scenario.scenario import ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.
@@ -402,12 +401,8 @@ def _prices_all_uavs(space: ScenarioSpace) -> bool:
 
 def most_battery_per_slot(space: ScenarioSpace) -> float:
     """The most that a slot in the air takes of a battery [%]."""
-    if space.consumption.is_on:
-        of_slots = space.consumption.constants(slowest(space.fleet))
-        most = of_slots["dearest_slot"] / PERCENT
-    else:
-        most = 1.0 + constants(space.wind, space.size)["wind_most"]
-    return space.flight_cost * most
+    energy = energy_constants(space.consumption, space.wind, space.size, slowest(space.fleet))
+    return float(space.flight_cost * energy["dearest_slot"] / PERCENT)
 
 
 def spent_battery(

@@ -28,12 +28,11 @@ from dess.model.record import (
     write_record,
 )
 from dess.model.state import MISSION, SENSOR, UAV, Starts, State
-from dess.model.ways_home import FAR as _FARTHEST
-from dess.model.ways_home import relax
+from dess.model.ways import FAR as _FARTHEST
+from dess.model.ways import relax
 from dess.physics.chart import FAR, Chart, fill_ways
-from dess.physics.consumption import has_consumption, slot_cost
+from dess.physics.energy import fill_move_costs
 from dess.physics.landing import is_over
-from dess.physics.wind import fill_surcharges
 from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
 
 _F8, _I8, _I4, _I2, _I1 = np.float64, np.int64, np.int32, np.int16, np.int8
@@ -82,8 +81,8 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "batches": (BATCH, 2),  # of ``Scratch``
     "search": (_I8, 2),
     "arrivals": (_F8, 1),
-    "reach": (_I4, 4),  # the tables of ``ways_home.reach_of`` and ``ways_home.ways_home``
-    "ways_home": (_I4, 3),
+    "reach": (_I4, 4),  # the tables of ``Ways.reach`` and ``Ways.home`` for its only energy
+    "ways_home": (_I4, 4),
     "circuit": (_I8, 1),  # of ``tour``
     "policies": (_I8, 1),  # (I,) the policy of each UAV
     "actions": (_I8, 1),  # (I,) what a UAV has decided in this slot, -1 if it was not asked
@@ -202,6 +201,14 @@ def _records(table):
 
 
 @kernel
+def _reach(table):
+    """As ``Ways.reach``: one table, or none where every slot takes one percent."""
+    at = _AT.reach
+    shape = (table[at + 1], table[at + 2], table[at + 3], table[at + 4])
+    return carray(_pointer(table[at]), (min(shape[0], 1), *shape), _I4)
+
+
+@kernel
 def prepare(table):
     """Fill the tables that follow from the sea: the ways between cells, and the battery home."""
     chart = _chart(table)
@@ -214,32 +221,21 @@ def prepare(table):
         fill_ways(row_by_row, neighbours, np.arange(zones.size), ways)
     mission = _array1(table, _AT.constants, _MISSION)[0]
     mission.pads = _count_pads(mission)  # the pads of several zones may have been changed
-    surcharges = np.zeros((4, *zones.shape), np.int64)
-    if mission.wind_most > 0:
-        fill_surcharges(
-            mission.wind_north, mission.wind_east, mission.wind_south, mission.wind_west,
-            mission.wind_gusts, mission.wind_seed, surcharges,
-        )  # fmt: skip
     moves = np.zeros((4, *zones.shape), np.int64)
     reach = _array4(table, _AT.reach, _I4)
-    home = _array3(table, _AT.ways_home, _I4)
+    home = _array4(table, _AT.ways_home, _I4)[0]
     reach[:] = _FARTHEST
     home[:] = _FARTHEST
     for slots in range(1, len(home) + 1):
-        for action in range(4):
-            for y in range(zones.shape[0]):
-                for x in range(zones.shape[1]):
-                    moves[action, y, x] = slots + surcharges[action, y, x]
-                    if has_consumption(mission):
-                        moves[action, y, x] = slots * slot_cost(mission, slots, action)
+        fill_move_costs(mission, slots, moves)
         for number in range(len(chart.parking)):
             x = chart.parking[number, 0]
             y = chart.parking[number, 1]
             home[slots - 1, y, x] = 0
             if number < len(reach) and slots <= reach.shape[1]:
                 reach[number, slots - 1, y, x] = 0
-                relax(zones, moves, reach[number, slots - 1])
-        relax(zones, moves, home[slots - 1])
+                relax(zones, moves, reach[number, slots - 1], False)
+        relax(zones, moves, home[slots - 1], False)
 
 
 @kernel
@@ -261,8 +257,8 @@ def play(table, first, count, launches, slots):
     world = _world(table)
     records = _records(table)
     nodes, mean_snr, order, means, chart = world
-    reach = _array4(table, _AT.reach, _I4)
-    ways = _array3(table, _AT.ways_home, _I4)
+    reach = _reach(table)
+    ways = _array4(table, _AT.ways_home, _I4)
     batches = _array2(table, _AT.batches, _BATCH)
     search = _array2(table, _AT.search, _I8)
     arrivals = _array1(table, _AT.arrivals, _F8)

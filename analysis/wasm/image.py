@@ -34,7 +34,7 @@ from dess.model.state import (
     types_of,
 )
 from dess.model.view import check_team
-from dess.model.ways_home import reach_of, ways_home
+from dess.model.ways import Ways
 from dess.physics.chart import neighbours_of
 from dess.physics.fleet import legs, type_of
 from dess.policies.heuristics import KINDS, plan_circuit
@@ -221,9 +221,10 @@ def _arrays_of(
     chart = world.chart
     scratch = empty_scratch(fleet, len(space.nodes))
     records = empty_records(missions, fleet, is_extended=True)
-    reach = reach_of(starts.constants, chart)
-    if reach is None:
-        reach = np.zeros((0, 0, 0, 0), np.int32)
+    ways = Ways(starts.constants, chart)
+    reach = np.zeros((0, 0, 0, 0), np.int32)
+    if ways.reach is not None and len(ways.reach):
+        reach = ways.reach[0]
     neighbours = np.zeros((0, 4), np.int32)
     if chart.ways.size:
         neighbours = neighbours_of(chart.zones)
@@ -247,7 +248,7 @@ def _arrays_of(
         "search": scratch.search,
         "arrivals": np.zeros(len(space.nodes)),
         "reach": reach,
-        "ways_home": ways_home(starts.constants, chart),
+        "ways_home": ways.home,
         "circuit": plan_circuit(world.nodes, chart),
         "policies": np.array(kinds, np.int64),
         "actions": np.zeros(fleet, np.int64),

@@ -26,7 +26,7 @@ from dess.model.state import (
     starts_of,
     state_of,
 )
-from dess.model.ways_home import ways_home
+from dess.model.ways import Ways
 from dess.scenario.scenario import AnyScenario
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
@@ -59,6 +59,7 @@ class MissionStepper:
         is_started: Whether missions have been launched.
         state: The arrays of the missions.
         world: The nodes and the tables of the channel.
+        ways: The battery that the ways between cells take.
         indices: (N,) the indices 0 to N - 1 of the environments.
     """
 
@@ -69,6 +70,7 @@ class MissionStepper:
         self.world = world_of(self.space)
         self.state = state_of([self.space], num_envs)
         self._starts = starts_of([self.space])
+        self.ways = Ways(self._starts.constants, self.world.chart)
         self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
         self.is_started = False
         self._is_seeded = seed is not None
@@ -154,8 +156,7 @@ class MissionStepper:
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
         records = empty_records_of([self.space], len(environments))
-        ways = ways_home(self.state.missions, self.world.chart)
-        write_records(environments, self.state, ways, records)
+        write_records(environments, self.state, self.ways.home, records)
         return records
 
 

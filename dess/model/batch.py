@@ -24,7 +24,8 @@ from dess.model.channel import empty_scratch, world_of
 from dess.model.record import Records, empty_records_of, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
-from dess.model.ways_home import ways_home
+from dess.model.ways import MOST_ENTRIES, Ways
+from dess.physics.fleet import slowest
 from dess.physics.landing import is_over
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
 
@@ -150,12 +151,29 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
         radio = (s.radio.anchor, s.radio.range)
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude, radio)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
-        flight = (*s.wind.model_dump().values(), s.consumption.slots)
+        has_costs = s.wind.blows or s.consumption.is_on
         geometry = (s.size, s.rectangles, s.no_fly, s.nodes)
-        return (s.is_extended, geometry, s.communication_slots, channel, speeds, flight)
+        return (s.is_extended, geometry, s.communication_slots, channel, speeds, has_costs)
 
+    groups = []
     ordered = sorted(range(len(spaces)), key=key)
-    return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
+    for _, members in groupby(ordered, key):
+        groups += _by_energy(spaces, sorted(members))
+    return groups
+
+
+def _by_energy(spaces: list[ScenarioSpace], members: list[int]) -> list[np.ndarray]:
+    """The indices of scenarios in groups, the tables of whose ways have room in memory."""
+    chart = spaces[members[0]].chart
+    entries = len(chart.parking) * slowest(spaces[members[0]].fleet) * chart.zones.size
+    most = max(MOST_ENTRIES // entries, 1)
+    numbers: dict[tuple, int] = {}
+    groups: dict[int, list[int]] = {}
+    for member in members:
+        energy = (spaces[member].wind, spaces[member].consumption)
+        number = numbers.setdefault(energy, len(numbers))
+        groups.setdefault(number // most, []).append(member)
+    return [np.array(group) for group in groups.values()]
 
 
 def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
@@ -168,12 +186,13 @@ def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
     queue = np.array([0, 0])  # next job, jobs done
     for b in range(size):
         _next_mission(b, job_of, queue, source, state)
-    ways, shown = ways_home(state.missions, world.chart), world.shown()
+    ways = Ways(source[0].constants, world.chart)
+    shown = world.shown()
     # Reporting holds Python's global lock, so about a hundred reports are made in all.
     reported, step = 0, max(1, len(jobs) // 100)
     while queue[1] < len(jobs) and not stopped.is_set():
-        decide(team, state, shown)
-        _advance(job_of, queue, source, state, world, scratch, ways, records)
+        decide(team, state, shown, ways)
+        _advance(job_of, queue, source, state, world, scratch, ways.home, records)
         if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
             progress(int(queue[1]) - reported)
             reported = int(queue[1])

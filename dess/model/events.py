@@ -176,7 +176,7 @@ class LogWriter(Listener):
 
     def note_end(self) -> None:
         """Log the state with which the mission ends."""
-        if self._mission["has_consumption"]:
+        if self._mission["has_costs"]:
             for uav, remainder in enumerate(self._uavs["remainder"].tolist()):
                 self._add("remainder", uav, remainder)
         self._add_state("mission_end", {})

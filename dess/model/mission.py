@@ -49,7 +49,7 @@ from dess.model.packets import Packets
 from dess.model.record import MissionRecord, empty_records_of, write_records
 from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
-from dess.model.ways_home import ways_home
+from dess.model.ways import Ways
 from dess.physics.charging import may_change_order, queue_key
 from dess.physics.chart import Chart
 from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
@@ -147,6 +147,7 @@ class Mission:
         self.shown_world = self.world.shown()  # what policies may see of it
         starts = starts_of([scenario], seed)
         self.state = state_of([scenario], 1)
+        self.ways = Ways(starts.constants, self.world.chart)
         rules.launch(self.state, 0, starts, 0, replication)
         self.mission = self.state.missions[0]
         self.uavs = self.state.uavs[0]
@@ -229,7 +230,7 @@ class Mission:
 
         This also tells which UAVs want a pad in this slot.
         """
-        decide(self.policies, self.state, self.shown_world)
+        decide(self.policies, self.state, self.shown_world, self.ways)
         self.wants_pad_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
 
     def give_turns(self) -> ProcessGenerator:
@@ -430,8 +431,7 @@ class Mission:
     def write_record(self) -> MissionRecord:
         """The record of the mission."""
         records = empty_records_of([self.scenario], 1)
-        ways = ways_home(self.state.missions, self.world.chart)
-        write_records(np.zeros(1, np.int64), self.state, ways, records)
+        write_records(np.zeros(1, np.int64), self.state, self.ways.home, records)
         if self.packets is not None:
             self.packets.write(records.operations[0])
         return records.mission(0, self.listener.log)

@@ -17,12 +17,12 @@ import numpy as np
 from dess.model.channel import mean_snr_at
 from dess.model.guard.battery import dearest_slot, margin
 from dess.model.state import constants_of, types_of
-from dess.physics import fleet, wind
-from dess.physics.chart import FAR, NO_FLY, parking_of, read_only, spread, zones_of
-from dess.physics.consumption import PERCENT
+from dess.model.ways import FAR as WAYS_FAR
+from dess.model.ways import move_costs, relax
+from dess.physics import fleet
+from dess.physics.chart import FAR, parking_of, read_only, spread, zones_of
+from dess.physics.energy import ACTIONS, HOVERING, PERCENT
 from dess.scenario.scenario import ScenarioSpace
-
-_STEPS = ((0, -1), (1, 0), (0, 1), (-1, 0))  # of the moves north, east, south and west [cells]
 
 
 class Costs(NamedTuple):
@@ -66,7 +66,7 @@ def reach_of_nodes(space: ScenarioSpace) -> Reach:
     for number in range(min(uavs, max(len(space.fleet), 1))):
         costs = costs_of(space, number)
         battery = PERCENT * _full_battery(space, number)
-        kept = _battery_of_guard(space, number, costs)
+        kept = _battery_of_guard(space, number)
         trips = battery_of_trips(space, costs)
         slots = _slots_of_trips(space, number)
         is_lasting = slots < space.max_slots
@@ -85,13 +85,8 @@ def costs_of(space: ScenarioSpace, uav: int) -> Costs:
     constants = constants_of(space)[0]
     slots = fleet.type_of(space.fleet, uav).slots_per_cell
     columns, rows = space.size
-    moves = np.full((4, rows, columns), slots, np.int64)
-    if space.consumption.is_on:
-        *in_each_direction, hover = space.consumption.slots[slots - 1]
-        return Costs(moves * np.array(in_each_direction)[:, None, None], hover)
-    if space.is_extended:
-        moves += wind.surcharges(space.size, *(constants[name].item() for name in wind.FIELDS))
-    return Costs(PERCENT * moves, PERCENT)
+    hovering = constants["slot_costs"].reshape(-1, ACTIONS)[slots - 1, HOVERING]
+    return Costs(move_costs(constants, slots, (rows, columns)), int(hovering))
 
 
 def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
@@ -100,8 +95,8 @@ def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
     It is infinite where no trip leads, and in zones, where a UAV that hovers is on the ground.
     """
     zones = zones_of(*space.size, space.rectangles, space.no_fly)
-    out = _cheapest(zones, costs.moves, is_outward=True)
-    back = _cheapest(zones, costs.moves, is_outward=False)
+    out = _cheapest(zones, costs.moves, outward=True)
+    back = _cheapest(zones, costs.moves, outward=False)
     return np.where(zones >= 0, math.inf, out + costs.hover + back)
 
 
@@ -135,28 +130,11 @@ def _served(space: ScenarioSpace, is_reached: np.ndarray) -> set[int]:
     return {k for k in range(len(space.nodes)) if (is_reached & in_range(space, k)).any()}
 
 
-def _cheapest(zones: np.ndarray, moves: np.ndarray, is_outward: bool) -> np.ndarray:
+def _cheapest(zones: np.ndarray, moves: np.ndarray, outward: bool) -> np.ndarray:
     """(H, W) the cheapest ways from some zone to each cell, or from each cell to some zone."""
-    rows, columns = zones.shape
-    costs = np.full((rows + 2, columns + 2), math.inf)  # with a rim that no way enters
-    own = costs[1:-1, 1:-1]
-    own[zones >= 0] = 0.0
-    is_closed = zones == NO_FLY
-    changed = True
-    while changed:
-        before = own.copy()
-        for move, (east, south) in zip(moves, _STEPS, strict=True):
-            if is_outward:  # the cell from which the move leads here
-                others = costs[1 - south : rows + 1 - south, 1 - east : columns + 1 - east]
-                np.minimum(own, others + move, out=own)
-            else:  # the cell to which the move leads from here
-                into = np.full_like(costs, math.inf)
-                into[1:-1, 1:-1] = own + move
-                others = into[1 + south : rows + 1 + south, 1 + east : columns + 1 + east]
-                np.minimum(own, others, out=own)
-            own[is_closed] = math.inf
-        changed = not np.array_equal(before, own)
-    return own
+    costs = np.where(zones >= 0, 0, WAYS_FAR).astype(np.int32)
+    relax(read_only(zones), moves, costs, outward)
+    return np.where(costs == WAYS_FAR, math.inf, costs)
 
 
 def _slots_of_trips(space: ScenarioSpace, uav: int) -> np.ndarray:
@@ -176,14 +154,12 @@ def _full_battery(space: ScenarioSpace, uav: int) -> int:
     return min(full, space.battery_of_type(kind) or full)
 
 
-def _battery_of_guard(space: ScenarioSpace, uav: int, costs: Costs) -> int:
+def _battery_of_guard(space: ScenarioSpace, uav: int) -> int:
     """What the return guard keeps of the battery [% / 1000]: its margins, and the last slot."""
     mission = constants_of(space).view(np.recarray)[0]
     mission.active = space.uavs[1]
     u = types_of(space).view(np.recarray)[uav]
-    if space.consumption.is_on:
-        return int(margin(mission, u) + dearest_slot(mission))
-    return PERCENT * int(margin(mission, u)) + costs.hover
+    return int(margin(mission, u) + dearest_slot(mission))
 
 
 def _cells_along_a_line(costs: Costs, battery: int) -> int:

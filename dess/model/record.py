@@ -13,7 +13,7 @@ from dess.model.rules import data_left
 from dess.model.state import BATTERY, END_NAMES, LANDED, LOST, QUOTA, fields
 from dess.physics.age import age_of_node, write_age
 from dess.physics.charging import write_use
-from dess.physics.consumption import PERCENT, has_consumption, slot_cost
+from dess.physics.energy import PERCENT, slot_cost_at
 from dess.physics.failures import write_failures
 from dess.physics.section import for_sections
 from dess.scenario.scenario import Constants, ScenarioSpace
@@ -132,7 +132,7 @@ def node_ratios(records: np.ndarray) -> np.ndarray:
 def write_records(places, state, ways, records):
     """Write the records of the missions at these (N,) places of the state.
 
-    ``ways`` is the table of ``ways_home.ways_home``.
+    ``ways`` are the tables ``Ways.home``.
     """
     for row in range(len(places)):
         b = places[row]
@@ -192,12 +192,10 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
 def _battery_home(mission, u, ways):
     """The battery [%] that a UAV must have for its cheapest way to a zone cell, at least.
 
-    Where slots have costs of their own, what it has spent of the next percent is included.
+    What it has spent of the next percent is included.
     """
-    way = ways[u.slots_per_cell - 1, u.y, u.x]
-    if not has_consumption(mission):
-        return way + u.slots_left
-    way += u.slots_left * slot_cost(mission, u.slots_per_cell, u.executed)
+    way = np.int64(ways[mission.energy, u.slots_per_cell - 1, u.y, u.x])
+    way += u.slots_left * slot_cost_at(mission, u.slots_per_cell, u.executed, u.x, u.y)
     spent = u.remainder if way > 0 else 0
     return (way + spent + PERCENT - 1) // PERCENT
 

@@ -32,11 +32,11 @@ from dess.model.state import (
     TRUNCATED,
     draw_parameters,
 )
-from dess.physics import age, fleet, streams, wind
+from dess.physics import age, fleet, streams
 from dess.physics.arrivals import draw_messages, has_messages
 from dess.physics.charging import charge_limit, gain, is_before, limit_battery, share_power
 from dess.physics.chart import is_open
-from dess.physics.consumption import has_consumption, spend_slot
+from dess.physics.energy import has_costs, spend_slot
 from dess.physics.failures import strike_if_on, take_pad, working_pads
 from dess.physics.landing import flies, has_finished, is_over, lands, next_latch, stands
 from dess.physics.radio import is_below_steps
@@ -301,19 +301,10 @@ def spend(mission, uavs):
 @inlined
 def _spend_in_the_air(mission, u):
     """Take the battery for a slot in the air."""
-    if has_consumption(mission):
+    if has_costs(mission):
         spend_slot(mission, u)
     else:
         u.battery -= mission.flight_cost
-        _spend_against_wind(mission, u)
-
-
-@for_sections
-def _spend_against_wind(mission, u):
-    """Take the surcharge of a move, in its first slot; a battery is never below 0."""
-    if mission.wind_most > 0 and fleet.begins_move(u):
-        extra = wind.move_surcharge(mission, u.x - u.from_x, u.y - u.from_y, u.x, u.y)
-        u.battery = max(u.battery - mission.flight_cost * extra, 0)
 
 
 @inlined

@@ -14,8 +14,8 @@ import numpy as np
 
 from dess.base.errors import InputError, check_type
 from dess.base.kernels import kernel
-from dess.physics import fleet, streams, wind
-from dess.physics.consumption import ACTIONS, SPEEDS
+from dess.physics import fleet, streams
+from dess.physics.energy import ACTIONS, ENERGY, SPEEDS, energy_constants
 from dess.physics.failures import MOST_PADS
 from dess.physics.radio import MOST_STEPS
 from dess.scenario.fields import MOST_ZONES, SAMPLED
@@ -72,16 +72,17 @@ MISSION = np.dtype(
         ("steps", np.int64),
         ("step_snr", np.float64, MOST_STEPS),
         ("step_rate", np.float64, MOST_STEPS),
-        # Wind: what its mean takes of moves and its deviation from cell to cell [% of battery per
-        # cell], and the largest surcharge of a move [%], 0 without wind.
-        *fields(np.float64, "wind_north wind_east wind_south wind_west wind_gusts"),
-        ("wind_seed", np.uint64),
-        ("wind_most", np.int64),
-        # Consumption: what a slot takes [% / 1000], by the slots per cell and the action, and the
-        # most that one takes.
-        ("has_consumption", np.int64),
+        # Energy: what a slot takes [% / 1000], by the slots per cell and the action, and the most
+        # that one takes; whether this is not one percent everywhere.
+        ("has_costs", np.int64),
         ("slot_costs", np.int16, SPEEDS * ACTIONS),
         ("dearest_slot", np.int64),
+        ("energy", np.int64),  # which of the energies of a batch it is
+        # What the mean wind takes of the four moves and its deviation from cell to cell [% of
+        # battery per cell], which count where gusts blow.
+        ("pushes", np.float64, 4),
+        ("gusts", np.float64),
+        ("gust_seed", np.uint64),
         ("slowest", np.int64),  # the most slots that a UAV of the fleet takes for a cell
         # Data and rewards.
         *fields(np.float64, "initial_low initial_high arrival_rate reward_data reward_overruled"),
@@ -230,9 +231,10 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "charge_slots": scenario.charge_fraction.denominator,
         "age_reward": scenario.age.reward,
         **({"arrival_rate": fmean(scenario.node_rates)} if own_rates else {}),
-        **wind.constants(scenario.wind, scenario.size),
         **scenario.radio.constants(),
-        **scenario.consumption.constants(fleet.slowest(scenario.fleet)),
+        **energy_constants(
+            scenario.consumption, scenario.wind, scenario.size, fleet.slowest(scenario.fleet)
+        ),
         **scenario.charging.constants(),
         **scenario.failures.constants(),
     }
@@ -295,10 +297,19 @@ def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
     kind = _constants_of(spaces[0]).dtype
     constants = np.concatenate([constants_of(space) for space in spaces], dtype=kind)
     constants["seed"] = seed
+    _number_energies(constants)
     ranges = np.stack([ranges_of(space) for space in spaces])
     types = np.stack([types_of(space, fleet) for space in spaces], dtype=UAV)
     data, rates = (np.array([getattr(s, of) for s in spaces]) for of in ("node_data", "node_rates"))
     return Starts(constants, ranges, types, data, rates)
+
+
+def _number_energies(constants: np.ndarray) -> None:
+    """Number the different energies of scenarios, in the order in which they come."""
+    numbers: dict[tuple[bytes, ...], int] = {}
+    for mission in constants:
+        key = tuple(mission[name].tobytes() for name in ENERGY)
+        mission["energy"] = numbers.setdefault(key, len(numbers))
 
 
 @kernel

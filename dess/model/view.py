@@ -15,6 +15,7 @@ from dess.base.kernels import kernel
 from dess.model.channel import World
 from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
+from dess.model.ways import Ways
 from dess.scenario.scenario import ScenarioSpace
 
 _POLICY = "a name such as greedy, an object with act(view), or a list of them"
@@ -34,8 +35,23 @@ class View:
         uav: (R,) index of each row's UAV in its mission.
     """
 
-    def __init__(self, state: State, world: World, mission: np.ndarray, uav: np.ndarray):
+    def __init__(
+        self,
+        state: State,
+        world: World,
+        mission: np.ndarray,
+        uav: np.ndarray,
+        ways: Ways | None = None,
+    ):
         self.state, self.world, self.mission, self.uav = state, world, mission, uav
+        self._ways = ways
+
+    @property
+    def ways(self) -> Ways:
+        """The battery that the ways between cells take."""
+        if self._ways is None:
+            self._ways = Ways(self.state.missions, self.world.chart)
+        return self._ways
 
     def __len__(self) -> int:
         return len(self.mission)
@@ -179,12 +195,12 @@ def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
         )
 
 
-def decide(team: Sequence[Any], state: State, world: World) -> None:
+def decide(team: Sequence[Any], state: State, world: World, ways: Ways) -> None:
     """Write the actions that the policies of a team choose into the state.
 
     UAV i follows policy ``team[i % len(team)]``. All policies decide before any action is written,
     so that no policy sees what a teammate decided in the same slot. ``world`` is what policies may
-    see of it (``World.shown``).
+    see of it (``World.shown``), ``ways`` are those of the batch.
 
     Raises:
         ValueError: If a policy does not return one action per row.
@@ -193,7 +209,7 @@ def decide(team: Sequence[Any], state: State, world: World) -> None:
     for number, policy in enumerate(team):
         mission, uav = acting_rows(state.missions, state.uavs, len(team), number)
         if len(mission):
-            actions = np.asarray(policy.act(View(state, world, mission, uav)))
+            actions = np.asarray(policy.act(View(state, world, mission, uav, ways)))
             if actions.shape != mission.shape or actions.dtype.kind not in "iu":
                 raise ValueError(
                     f"policy {policy.name}: act must return {len(mission)} integers, "

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from dess.base.descriptions import Description
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.physics.consumption import ACTIONS, PERCENT, has_consumption
+from dess.physics.energy import ACTIONS, HOVERING, PERCENT
 from dess.physics.section import Integer, Section, for_sections
 
 
@@ -60,7 +60,7 @@ def is_before(mission, u, other):
     if mission.lowest_battery_first:
         if u.battery != other.battery:
             return u.battery < other.battery
-        if has_consumption(mission) and u.remainder != other.remainder:
+        if u.remainder != other.remainder:
             return u.remainder > other.remainder
     return u.pad_request < other.pad_request
 
@@ -72,7 +72,8 @@ def may_change_order(mission: np.void) -> bool:
     """
     if not mission["lowest_battery_first"] or mission["landing"]:
         return False
-    return bool(mission["has_consumption"] and mission["slowest"] > 1)
+    of_hovering = mission["slot_costs"][HOVERING::ACTIONS][: mission["slowest"]]
+    return bool(of_hovering.min() != of_hovering.max())
 
 
 def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
@@ -93,11 +94,9 @@ def queue_key(mission: np.void, u: np.void, uav: int) -> tuple[int, int, int]:
         request = slot
     if not mission["lowest_battery_first"]:
         return 0, request, uav
-    battery = int(u["battery"])
-    cost = int(mission["flight_cost"])
-    if mission["has_consumption"]:
-        battery = PERCENT * battery - int(u["remainder"])
-        cost *= int(mission["slot_costs"][int(u["slots_per_cell"]) * ACTIONS - 1])  # of hovering
+    battery = PERCENT * int(u["battery"]) - int(u["remainder"])
+    hovering = mission["slot_costs"][HOVERING::ACTIONS][int(u["slots_per_cell"]) - 1]
+    cost = int(mission["flight_cost"]) * int(hovering)
     if mission["landing"] or may_change_order(mission):
         cost = 0
     return battery + cost * slot, request, uav

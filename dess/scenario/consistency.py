@@ -10,8 +10,8 @@ from dess.physics.age import MOST_TEETH
 from dess.physics.arrivals import MOST as MOST_RATE
 from dess.physics.arrivals import MOST_MESSAGES
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
-from dess.physics.consumption import MOST as MOST_COST
-from dess.physics.consumption import PERCENT
+from dess.physics.energy import MOST as MOST_COST
+from dess.physics.energy import PERCENT
 from dess.physics.failures import MOST_PADS
 from dess.physics.fleet import IN_UNITS, legs, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet

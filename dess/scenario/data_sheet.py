@@ -21,7 +21,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from dess.base.descriptions import Description, description_of
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown
-from dess.physics.consumption import MOST, PERCENT, SPEEDS, Costs
+from dess.physics.energy import MOST, PERCENT, SPEEDS, Costs
 from dess.physics.fleet import IN_UNITS, UavType
 from dess.physics.radio import MOST_STEPS
 from dess.physics.section import Section

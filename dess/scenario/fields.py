@@ -14,12 +14,11 @@ from dess.physics.age import Age
 from dess.physics.arrivals import MOST_AMOUNT, Arrivals
 from dess.physics.charging import Charging, charge_fraction
 from dess.physics.chart import MOST_CHARTED, Cell, Chart, Rectangle, chart_at
-from dess.physics.consumption import Consumption
+from dess.physics.energy import Consumption, Wind
 from dess.physics.failures import Failures
 from dess.physics.fleet import UavType
 from dess.physics.radio import Radio
 from dess.physics.section import Integer, Number, Section, Strict, tuples
-from dess.physics.wind import Wind
 from dess.scenario.data_sheet import DataSheet, Units
 
 # Section VI-A: all combinations of five columns and five rows.

@@ -61,7 +61,7 @@ class LearnedPolicy:
             InputError: If the missions have another grid, other zone or other nodes than the
                 training.
         """
-        states = compact_states(view.state, view.world.chart, self.guarded)
+        states = compact_states(view.state, view.world.chart, self.guarded, view.ways)
         allowed = masks(states, view.mission, view.uav)
         actions = np.empty(len(view), np.int64)
         for of_sea, encoder in self._rows_by_sea(view):

@@ -78,7 +78,7 @@ def first_plan(
     """
     watched = _Watched(planner or Planner())
     model = Mission(scenario, [watched], seed, replication)
-    decide(model.policies, model.state, model.shown_world)
+    decide(model.policies, model.state, model.shown_world, model.ways)
     return watched.plans[0]
 
 

@@ -25,14 +25,13 @@ from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import (
     MARGIN_PER_TEAMMATE,
     SCARCE_SLOTS,
-    battery_left,
     dearest_slot,
 )
 from dess.model.guard.ways import battery_of_flight
 from dess.model.state import HOVER, STEP_X, STEP_Y, fields
 from dess.physics.charging import charge_limit, gain
 from dess.physics.chart import distance, in_zone, is_open
-from dess.physics.consumption import PERCENT, has_consumption, slot_cost
+from dess.physics.energy import PERCENT, has_costs, slot_cost_at, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.fleet import leg
 from dess.physics.landing import has_finished, lands, next_latch
@@ -192,7 +191,7 @@ def begin_flight(mission, uavs, residual, flight):
         u = uavs[i]
         v = flight.team[0, i]
         v.x, v.y, v.counted = u.x, u.y, u.communications
-        v.battery = battery_left(mission, u)
+        v.battery = thousandths_left(u)
         v.charging = u.charging
         v.latch = u.latch
         v.active = u.active and not u.grounded
@@ -390,26 +389,20 @@ def _act_for_slot(mission, rates, waypoints, team, i, t, active):
         v.x += STEP_X[v.action]
         v.y += STEP_Y[v.action]
         v.slots_left = v.slots_per_cell - 1
-        if rates.extra.size > 0:
-            v.battery -= mission.flight_cost * rates.extra[v.action, v.y, v.x]
     v.battery -= mission.flight_cost * _cost_of_slot(mission, v)
     return penalty
 
 
 @inlined
 def _cost_of_slot(mission, v):
-    """The battery that a slot in the air takes, without the surcharge of the wind."""
-    if has_consumption(mission):
-        return slot_cost(mission, v.slots_per_cell, v.action)
-    return 1
+    """The battery that a slot in the air takes."""
+    return slot_cost_at(mission, v.slots_per_cell, v.action, v.x, v.y)
 
 
 @inlined
 def _percent_left(mission, v):
     """The battery in whole percent, as the rules have it."""
-    if has_consumption(mission):
-        return (v.battery + PERCENT - 1) // PERCENT
-    return v.battery
+    return (v.battery + PERCENT - 1) // PERCENT
 
 
 @inlined
@@ -534,10 +527,7 @@ def _charge_for_slot(mission, v):
     v.charge_slots += 1
     before = _percent_left(mission, v)
     after = min(before + gain(mission, v, v.charge_slots), charge_limit(mission, v))
-    if has_consumption(mission):
-        v.battery += PERCENT * (after - before)
-    else:
-        v.battery = after
+    v.battery += PERCENT * (after - before)
 
 
 @inlined
@@ -550,9 +540,7 @@ def _begin_to_charge(mission, v, active):
     _charge_for_slot(mission, v)
     kept = dearest_slot(mission) * (1 + _slots_for_detours(mission, v, active))
     lacking = max(kept - before, 0)
-    if has_consumption(mission):
-        return _LATE * lacking / PERCENT
-    return _LATE * lacking
+    return _LATE * lacking / PERCENT
 
 
 @inlined
@@ -584,12 +572,12 @@ def _must_return(mission, rates, v, t, active):
     way = distance(rates.chart, v.x, v.y, home[0], home[1]) * v.slots_per_cell
     left = mission.max_slots - mission.slot - t
     kept = v.slots_per_cell + 2 + _slots_for_detours(mission, v, active)
-    if has_consumption(mission):
+    if has_costs(mission):
         spent = _battery_to_cell(mission, rates.chart, v, home[0], home[1])
         spent += mission.flight_cost * kept * mission.dearest_slot
         return way + kept > left or spent > v.battery
     if mission.flight_cost > 0:
-        left = min(left, v.battery)
+        left = min(left, _percent_left(mission, v))
     return way + kept > left
 
 
@@ -604,7 +592,7 @@ def _battery_to_cell(mission, chart, v, x, y):
 @inlined
 def _slots_for_detours(mission, v, active):
     """The slots that the return guard keeps for the detours around teammates."""
-    return (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
+    return (active - 1) * MARGIN_PER_TEAMMATE * v.slots_per_cell
 
 
 @inlined

@@ -17,7 +17,6 @@ from dess.base.kernels import kernel
 from dess.model.channel import efficiency
 from dess.model.state import MISSION, STEP_X, STEP_Y
 from dess.model.view import View
-from dess.physics import wind
 from dess.physics.chart import Chart
 
 # Nodes kept per step. The farther ones give next to no data, and nothing is planned with them.
@@ -47,18 +46,15 @@ CANDIDATE = np.dtype([("node", np.int32), ("rate", np.float32)])
 
 
 class Rates(NamedTuple):
-    """What a UAV may collect in a slot, and what its moves cost.
+    """What a UAV may collect in a slot.
 
     Attributes:
         candidates: (5 * W * H, C) ``CANDIDATE`` records of each step, in descending order of the
             rate; rows as in ``World.order``.
-        extra: (4, H, W) surcharges of moves in the wind [%], by action and the cell that it leads
-            to; (0, 0, 0) where there is no wind.
         chart: The zones, the no-fly cells and the ways between cells.
     """
 
     candidates: np.ndarray
-    extra: np.ndarray
     chart: Chart
 
 
@@ -76,11 +72,7 @@ def load_rates(view: View) -> Rates:
         int(mission["slowest"]),
         _channel_of(view.state.missions),
     )
-    extra = np.zeros((0, 0, 0), np.int64)
-    if mission["wind_most"] > 0:
-        field = (mission[name].item() for name in wind.FIELDS)
-        extra = wind.surcharges((columns, rows), *field).copy()
-    return Rates(candidates, extra, chart)
+    return Rates(candidates, chart)
 
 
 @lru_cache(maxsize=8)

@@ -8,11 +8,11 @@ import pandas as pd
 
 from dess.analysis.results import event_log
 from dess.analysis.results.tables import Results
-from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
+from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST, constants_of
+from dess.model.ways import move_costs
 from dess.physics.fleet import type_of
-from dess.physics.wind import surcharges
 from dess.scenario.fields import SAMPLED
-from dess.scenario.scenario import Scenario
+from dess.scenario.scenario import Scenario, ScenarioSpace
 from tests.verification.checks import (
     CONSERVATION,
     ENERGY,
@@ -120,16 +120,17 @@ def battery_errors(log: Log) -> np.ndarray:
 
 def _costs(scenario: Scenario, table: pd.DataFrame) -> Any:
     """(N,) the battery [%] that each UAV slot in the air takes."""
-    if not scenario.consumption.is_on:
-        return 1 + _wind_surcharges(scenario, table)
-    costs = np.array(scenario.consumption.slots)
+    mission = constants_of(ScenarioSpace.of(scenario))[0]
     spent = np.zeros(len(table), np.int64)
     for uav, rows in table.groupby("uav"):
         slots = type_of(scenario.fleet, int(str(uav))).slots_per_cell
         action = _actions(rows).where(rows["moved"]).mask(rows["grounded"], HOVER)
         if slots > 1:  # a failure ends a move
             action = action.ffill(limit=slots - 1)
-        taken = costs[slots - 1, action.fillna(HOVER).astype(int)]
+        moves = move_costs(mission, slots, scenario.chart.zones.shape) // slots
+        hovering = np.full((1, *moves.shape[1:]), mission["slot_costs"][5 * slots - 1])
+        of_cells = np.concatenate([moves, hovering])
+        taken = of_cells[action.fillna(HOVER).astype(int), rows["y"], rows["x"]]
         total = np.cumsum(np.where(rows["charging"] | rows["grounded"], 0, taken))
         spent[rows.index] = np.diff(total // 1000, prepend=0)  # whole percents leave the battery
     return spent
@@ -144,15 +145,6 @@ def _first_battery(scenario: Scenario) -> dict[int, int]:
     """The battery of each UAV at the start [%]."""
     types = [type_of(scenario.fleet, i) for i in range(scenario.uavs)]
     return {i: kind.flying_time or scenario.flying_time for i, kind in enumerate(types)}
-
-
-def _wind_surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
-    """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
-    wind = scenario.wind
-    field = surcharges(scenario.size, *wind.pushes(), wind.gusts, wind.seed)
-    x = table["x"].to_numpy()
-    y = table["y"].to_numpy()
-    return np.where(table["moved"], field[_actions(table), y, x], 0)
 
 
 def _actions(table: pd.DataFrame) -> pd.Series:

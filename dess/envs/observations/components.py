@@ -6,8 +6,7 @@ from dess.base.kernels import kernel
 from dess.model.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
 from dess.physics.charging import charge_limit
 from dess.physics.chart import is_open
-from dess.physics.consumption import PERCENT, has_consumption, slot_cost
-from dess.physics.wind import move_surcharge
+from dess.physics.energy import PERCENT, slot_cost_at
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 # The UAV's own state, whether it waits for a pad, the way to the nearest cell of a zone, the
@@ -157,10 +156,8 @@ def _quota_share(u):
 @kernel
 def _surcharge(mission, u, action, x, y):
     """What a move costs more than one percent a slot, 0 if it costs less [%]."""
-    if has_consumption(mission):
-        more = slot_cost(mission, u.slots_per_cell, action) - PERCENT
-        return max(u.slots_per_cell * more, 0) / PERCENT
-    return float(move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y))
+    more = slot_cost_at(mission, u.slots_per_cell, action, x, y) - PERCENT
+    return max(u.slots_per_cell * more, 0) / PERCENT
 
 
 @kernel

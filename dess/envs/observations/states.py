@@ -19,9 +19,9 @@ from dess.model.guard.moves import guide
 from dess.model.guard.ways import battery_home, cells_home
 from dess.model.rules import legal_moves, may_act
 from dess.model.state import HOVER, State
-from dess.model.ways_home import reach_of
+from dess.model.ways import Ways
 from dess.physics.chart import Chart, zones_of
-from dess.physics.consumption import PERCENT, has_consumption
+from dess.physics.energy import PERCENT
 from dess.scenario.scenario import ScenarioSpace
 
 # Columns of ``CompactStates.missions``.
@@ -103,16 +103,19 @@ def empty_states(count: int, uavs: int, nodes: int) -> CompactStates:
     )
 
 
-def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
+def compact_states(
+    state: State, chart: Chart, guarded: bool, ways: Ways | None = None
+) -> CompactStates:
     """The compact states of all missions of a state.
 
     Args:
         state: The state of B missions.
         chart: Their chart.
         guarded: True for the mask of the return guard, False for the mask of all legal actions.
+        ways: Those of the batch; without them, they are made of the missions of the state.
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
-    reach = reach_of(state.missions, chart)
+    reach = (ways or Ways(state.missions, chart)).reach
     rows = _active_rows(state.missions, state.uavs)
     guidance = guide(state.missions, state.uavs, state.residual, *rows, *chart, reach, True)
     _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *guidance, *states)
@@ -157,9 +160,8 @@ def _fill(
                 continue
             row[MUST_CHARGE] = charge[guided]
             battery = battery_home(mission, team, i, chart, None, u.x, u.y, home[guided], reach)
-            if has_consumption(mission):
-                cells = cells_home(mission, team, i, chart, None, u.x, u.y, home[guided])
-                battery = _observed_battery(battery, cells * u.slots_per_cell)
+            cells = cells_home(mission, team, i, chart, None, u.x, u.y, home[guided])
+            battery = _observed_battery(battery, cells * u.slots_per_cell)
             row[HOME] = min(battery, _MOST)
             if may_act(u):
                 row[MASK] = safe[guided] if guarded else legal_moves(chart, u)

@@ -1,10 +1,10 @@
 """Whether the battery of a UAV lasts until its quota is filled, and the margins that are kept.
 
-The guard counts batteries in percent; in missions whose slots have costs of their own
-(``dess.physics.consumption``), it counts them in thousandths of a percent. There the battery is no
-time any more, so that both must last: the battery for the cheapest way home, and the slots that are
-left for the shortest one. A slot of waiting counts as the dearest one; a slot of a margin counts
-half of the dearest way forth and back, since a detour is one.
+The guard counts batteries in thousandths of a percent (``dess.physics.energy``). Where slots take
+anything else than one percent each, the battery is no time any more, so that both must last: the
+battery for the cheapest way home, and the slots that are left for the shortest one. A slot of
+waiting counts as the dearest one; a slot of a margin counts half of the dearest way forth and back,
+since a detour is one.
 """
 
 import math
@@ -12,7 +12,7 @@ import math
 from dess.base.kernels import inlined
 from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
 from dess.physics.charging import own_limit
-from dess.physics.consumption import has_consumption, slot_cost, thousandths_left
+from dess.physics.energy import PERCENT, has_costs, slot_cost, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
 from dess.physics.radio import has_limit
@@ -89,7 +89,7 @@ def _rate(mission, u):
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota with its battery and must charge first.
 
-    In wind, every move until then may cost the most. If little data is left, a communication slot
+    Every slot until then may cost the most. If little data is left, a communication slot
     may find no node to serve, so a margin is added. Where flying costs no battery, or no pad will
     ever work again, no UAV must charge. In a mission that ends on the ground, every UAV must keep
     a zone within reach.
@@ -106,47 +106,38 @@ def must_charge(mission, u, data):
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
-    return battery_left(mission, u) < mission.flight_cost * _most_battery(mission, u, needed)
+    return thousandths_left(u) < mission.flight_cost * dearest_slot(mission) * needed
 
 
 @inlined
 def will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
     least = dearest_slot(mission) * slots_needed(mission, u)
-    needs = battery_left(mission, u) < mission.flight_cost * least
+    needs = thousandths_left(u) < mission.flight_cost * least
     return flies(u) and (needs or lands(mission) or has_limit(mission))
 
 
 @inlined
-def battery_left(mission, u):
-    """The battery of UAV ``u`` in the unit of the guard."""
-    if has_consumption(mission):
-        return thousandths_left(mission, u)
-    return u.battery
-
-
-@inlined
 def dearest_slot(mission):
-    """The battery that a slot of waiting or of a detour counts."""
-    if has_consumption(mission):
-        return mission.dearest_slot
-    return 1
+    """The battery that a slot of waiting or of a detour counts [% / 1000]."""
+    return mission.dearest_slot
 
 
 @inlined
 def usable_battery(mission, u):
-    """The battery that UAV ``u`` may spend in the air at most.
+    """The battery that UAV ``u`` may spend in the air at most [% / 1000].
 
     Where a slot takes one percent, the battery is a time: if missions end on the ground, no more
     than to the end of the mission. Elsewhere see ``late_slots``.
     """
     if not lands(mission):
-        return battery_left(mission, u)
-    left = mission.max_slots - mission.slot
-    if has_consumption(mission):
-        most = left * mission.dearest_slot
-        return thousandths_left(mission, u) if mission.flight_cost > 0 else most
-    return min(u.battery, left) if mission.flight_cost > 0 else left
+        return thousandths_left(u)
+    most = (mission.max_slots - mission.slot) * dearest_slot(mission)
+    if mission.flight_cost == 0:
+        return most
+    if has_costs(mission):
+        return thousandths_left(u)
+    return min(thousandths_left(u), most)
 
 
 @inlined
@@ -156,7 +147,7 @@ def late_slots(mission, slots):
     Only a mission that ends on the ground has such an end; where a slot takes one percent of the
     battery, ``usable_battery`` has it.
     """
-    if has_consumption(mission) and lands(mission):
+    if has_costs(mission) and lands(mission):
         return max(slots - (mission.max_slots - mission.slot), 0)
     return 0
 
@@ -168,20 +159,6 @@ def _all_pads(mission):
     for zone in range(mission.zones):
         pads += working_pads(mission, zone)
     return pads
-
-
-@inlined
-def _most_battery(mission, u, slots):
-    """The battery that so many slots in the air take at most."""
-    if has_consumption(mission):
-        return slots * mission.dearest_slot
-    return slots + _most_wind(mission, u, slots)
-
-
-@for_sections
-def _most_wind(mission, u, slots):
-    """The battery [%] that the wind costs at most in moves that take so many slots."""
-    return mission.wind_most * ((slots + u.slots_per_cell - 1) // u.slots_per_cell)
 
 
 @inlined
@@ -197,24 +174,12 @@ def cannot_leave(mission, u):
     Only types of UAVs that are slow or have small batteries can be in this state when they are
     fully charged: they stay where they stand.
     """
-    if not has_consumption(mission) or mission.flight_cost == 0:
+    if not has_costs(mission) or mission.flight_cost == 0:
         return False
     if own_limit(mission, u) == 0 and u.slots_per_cell == 1:
         return False
     slots = margin_slots(mission, u) + 2 * u.slots_per_cell + 1
-    return battery_left(mission, u) <= dearest_slot(mission) * slots
-
-
-@inlined
-def lasts(mission, u):
-    """Whether the battery lasts to the end of the mission in any wind, so that only time counts.
-
-    Where slots have costs of their own, time and battery are counted each by itself.
-    """
-    if has_consumption(mission):
-        return False
-    left = mission.max_slots - mission.slot
-    return ends_soon(mission, u) and u.battery > left * (1 + mission.wind_most)
+    return thousandths_left(u) <= dearest_slot(mission) * slots
 
 
 @inlined
@@ -225,9 +190,11 @@ def margin(mission, u):
 
 @inlined
 def _slot_of_detour(mission, u):
-    """The battery for a slot of a detour, which goes forth and back, or of waiting."""
-    if not has_consumption(mission):
-        return 1
+    """The battery for a slot of a detour, which goes forth and back, or of waiting [% / 1000]."""
+    if not has_costs(mission):
+        return PERCENT
+    if mission.gusts > 0.0:  # the gusts of two cells are hardly ever both the strongest
+        return (PERCENT + dearest_slot(mission) + 1) // 2
     slots = u.slots_per_cell
     across = slot_cost(mission, slots, NORTH) + slot_cost(mission, slots, SOUTH)
     along = slot_cost(mission, slots, EAST) + slot_cost(mission, slots, WEST)
@@ -236,12 +203,9 @@ def _slot_of_detour(mission, u):
 
 @inlined
 def margin_slots(mission, u):
-    """The slots that UAV ``u`` keeps for detours around teammates.
-
-    A detour goes forth and back, so the wind costs the most in one direction only.
-    """
+    """The slots that UAV ``u`` keeps for detours around teammates."""
     teammates = mission.active - 1
-    for_each = MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most
+    for_each = MARGIN_PER_TEAMMATE * u.slots_per_cell
     if not lands(mission):
         return teammates * for_each
     if teammates == 0:

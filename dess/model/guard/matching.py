@@ -55,7 +55,7 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         chart: ``Chart``.
         plan: ``Plan``; the zone of each UAV is written into it, when it can be there, and which
             zones are full.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
     """
     prices = np.full((mission.uavs, mission.zones), _NO_WAY, np.int64)
     left = chart.sizes.copy()

@@ -7,7 +7,6 @@ import numpy as np
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import (
     dearest_slot,
-    lasts,
     late_slots,
     margin,
     margin_slots,
@@ -21,7 +20,6 @@ from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import (
     battery_around,
     battery_home,
-    battery_of_move,
     cells_home,
     is_late,
     is_parked,
@@ -29,10 +27,10 @@ from dess.model.guard.ways import (
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
-from dess.model.ways_home import is_calm, reach_of
+from dess.model.ways import is_calm
 from dess.physics.charging import longest_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
-from dess.physics.consumption import has_consumption, slot_cost
+from dess.physics.energy import PERCENT, has_costs, move_cost, slot_cost
 from dess.physics.landing import lands
 
 _MOST_BATTERY = 2**40  # more than any way costs
@@ -158,7 +156,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home: The result of ``parking_cell``.
         planned: As in ``Parking``, as ``parking_cell`` leaves it.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
 
     Returns:
         The safe actions, a bit for each.
@@ -192,12 +190,12 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
                 needed = battery_around(mission, uavs, i, chart, planned, x, y, home, reach)
             else:
                 needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
-            needed += 1 if is_calm(reach) else _cost(mission, u, chart, action, x, y)
+            needed += PERCENT if is_calm(reach) else _cost(mission, u, chart, action, x, y)
             kept = reserve
             if not is_calm(reach) and home.cells > 0:
                 # The cheapest way may lead through a parked teammate; a move must do as well.
                 if action == HOVER and not _is_shut_out(mission, uavs, u, chart, home):
-                    needed = max(needed, fewest + 1)
+                    needed = max(needed, fewest + _least_difference(mission))
                 fewest = min(fewest, needed)
                 kept = max(kept, _wait(mission, u, chart, action, x, y, home))
             # One slot is the charging slot itself; the battery must not be depleted before it.
@@ -231,7 +229,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
-        if least > 0 and (has_consumption(mission) or is_tight(mission, chart)):
+        if least > 0 and (has_costs(mission) or is_tight(mission, chart)):
             return _nearer_to_zone(chart, u, nearest & clear)
         return nearest & clear
     if least > 0 and clear & in_time:
@@ -256,7 +254,7 @@ def _one_of(actions, number):
 @inlined
 def _late_home(mission, uavs, i, chart, planned, action, x, y, home):
     """What lacks if an action brings a UAV home too late, as the battery of the slots that lack."""
-    if not has_consumption(mission):
+    if not has_costs(mission):
         return 0
     u = uavs[i]
     cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
@@ -304,25 +302,32 @@ def _wait(mission, u, chart, action, x, y, home):
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
     if home.begins <= arrives:
         return 0
-    if has_consumption(mission):
-        return (home.begins - arrives + 2) * mission.dearest_slot
-    return home.begins - arrives + 2 * mission.wind_most
+    slots = home.begins - arrives
+    if has_costs(mission):
+        slots += 2
+    return slots * dearest_slot(mission)
 
 
 @inlined
 def _cost(mission, u, chart, action, x, y):
-    """The battery for an action of a UAV that leads to a cell, where not every cell costs 1 %."""
+    """The battery for an action of a UAV that leads to a cell [% / 1000]."""
     if action == HOVER:
         if in_zone(chart, x, y) and u.latch:
             return 0
-        if not has_consumption(mission):
-            return 1
+        if not has_costs(mission):
+            return PERCENT
         if in_zone(chart, x, y) and lands(mission):
             return 0
         return slot_cost(mission, u.slots_per_cell, HOVER)
-    if lasts(mission, u):
-        return u.slots_per_cell
-    return battery_of_move(mission, u.slots_per_cell, action, x, y)
+    return move_cost(mission, u.slots_per_cell, action, x, y)
+
+
+@inlined
+def _least_difference(mission):
+    """The least by which the battery for one way may exceed that for another [% / 1000]."""
+    if has_costs(mission):
+        return 1
+    return PERCENT
 
 
 class Guidance(NamedTuple):
@@ -357,7 +362,7 @@ def guide(
         rows_uav: (R,) index of each row's UAV in its mission.
         zones, parking, sizes, nearest, ways, rows: Those of the ``Chart``, which takes longer as
             one argument.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
         find_all: Whether to find the parking cells of UAVs that need not charge, too; without, such
             a UAV has its present cell.
     """
@@ -392,7 +397,7 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
         memory: ``parking_memory``.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
         find_home: Whether to find its parking cell if it need not charge, too; without, this is its
             present cell.
     """
@@ -408,8 +413,7 @@ def guard(view: View) -> np.ndarray:
 
     Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
-    state, chart = view.state, view.world.chart
-    reach = reach_of(state.missions, chart)
+    state, chart, reach = view.state, view.world.chart, view.ways.reach
     guidance = guide(
         state.missions, state.uavs, state.residual, view.mission, view.uav, *chart, reach, False
     )

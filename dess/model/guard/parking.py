@@ -18,7 +18,7 @@ from dess.model.guard.queues import (
     waits_in_zone,
 )
 from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
-from dess.model.ways_home import is_calm
+from dess.model.ways import is_calm
 from dess.physics.chart import distance
 from dess.physics.landing import lands
 from dess.scenario.fields import MOST_ZONES
@@ -113,7 +113,7 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
         memory: ``parking_memory``.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
     """
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
@@ -220,7 +220,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
         i: Index of the UAV.
         chart: ``Chart``.
         memory: ``parking_memory``, with the plan of pads.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
 
     Returns:
         The ``Home``, without waits; the UAV's own cell if all are taken.
@@ -357,7 +357,7 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         most: ``_FREE`` for a cell without a teammate, or ``_OCCUPIED``.
         chart: ``Chart``.
         memory: ``parking_memory``.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
 
     Returns:
         The number of the cell, -1 if there is none; the way to it [cells]; the battery for it.

@@ -26,12 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import battery_left, dearest_slot, must_charge
+from dess.model.guard.battery import dearest_slot, must_charge
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
 from dess.physics.charging import charge_limit, is_before, slots_to_charge
 from dess.physics.chart import distance
-from dess.physics.consumption import PERCENT, has_consumption, slot_cost
+from dess.physics.energy import PERCENT, slot_cost, thousandths_left
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.physics.section import for_sections
@@ -156,7 +156,7 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
         plan: ``plan_memory``; the plan is written into it.
-        reach: The table of ``reach_of``.
+        reach: ``Ways.reach``.
 
     Returns:
         The slots of its battery that UAV ``i`` must keep for waits; in how many slots it begins to
@@ -188,27 +188,21 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
 @inlined
 def _slots_of(mission, battery):
     """The slots that a battery lasts for a UAV that waits in the air."""
-    if has_consumption(mission):
-        return battery // mission.dearest_slot
-    return battery
+    return battery // dearest_slot(mission)
 
 
 @inlined
 def _slots_of_percent(mission, percent):
     """The slots that so many percent of a battery last for a UAV that waits in the air."""
-    if has_consumption(mission):
-        return PERCENT * percent // mission.dearest_slot
-    return percent
+    return PERCENT * percent // dearest_slot(mission)
 
 
 @inlined
 def _slots_to_charge_start(mission, battery):
     """The slots in which a UAV that hovers spends so much battery that it may charge."""
-    if has_consumption(mission):
-        more = max(battery - PERCENT * mission.charge_start, 0)
-        hovering = slot_cost(mission, 1, HOVER)
-        return (more + hovering - 1) // hovering
-    return max(battery - mission.charge_start, 0)
+    more = max(battery - PERCENT * mission.charge_start, 0)
+    hovering = slot_cost(mission, 1, HOVER)
+    return (more + hovering - 1) // hovering
 
 
 @inlined
@@ -277,14 +271,14 @@ def _price(mission, uavs, chart, zone, plan):
             continue
         count += 1
         way, spent = turn.way[zone], turn.spent[zone]
-        turn.deadline = way + _slots_of(mission, battery_left(mission, u) - spent) - 1
+        turn.deadline = way + _slots_of(mission, thousandths_left(u) - spent) - 1
         if u.pad_request >= 0:
             turn.asks = u.pad_request - mission.slot
             continue
         asked = False
         turn.asks = way
         if not u.latch:
-            turn.asks += _slots_to_charge_start(mission, battery_left(mission, u) - spent)
+            turn.asks += _slots_to_charge_start(mission, thousandths_left(u) - spent)
     plan.queues[zone].order = _AS_ASKED
     plan.queues[zone].change = CHANGE if count > chart.sizes[zone] else 0
     least = _serve(mission, uavs, zone, _AS_ASKED, plan)
@@ -378,9 +372,8 @@ def _is_next(mission, uavs, j, other, order, time, plan):
 def _time_on_pad(mission, uavs, j, begins, plan):
     """The slots for which UAV ``j`` charges if it begins so many slots from now."""
     empty = plan.turns[j].deadline + 1 - begins  # the slots that are left of its battery then
-    if has_consumption(mission):
-        empty = empty * mission.dearest_slot // PERCENT
-    return _charging_time(mission, uavs[j], plan.turns[j].zone, max(empty, 0))
+    percent = max(empty, 0) * dearest_slot(mission) // PERCENT
+    return _charging_time(mission, uavs[j], plan.turns[j].zone, percent)
 
 
 @inlined

@@ -5,20 +5,13 @@ import heapq
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import (
-    cannot_leave,
-    dearest_slot,
-    ends_soon,
-    lasts,
-    usable_battery,
-)
+from dess.model.guard.battery import cannot_leave, dearest_slot, ends_soon, usable_battery
 from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
-from dess.model.ways_home import FAR
+from dess.model.ways import FAR, is_calm
 from dess.physics.charging import longest_charge
 from dess.physics.chart import distance, is_open, length_around
-from dess.physics.consumption import has_consumption, slot_cost
+from dess.physics.energy import PERCENT, has_costs, move_cost, slot_cost
 from dess.physics.landing import lands
-from dess.physics.wind import move_surcharge
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
 CELLS_PER_UAV = 4
@@ -121,7 +114,7 @@ def battery_home(mission, uavs, i, chart, planned, x, y, home, reach):
         chart: ``Chart``.
         x, y: The cell.
         home: ``Home``.
-        reach: The table of ``reach_of``. A detour around parked teammates is not in it; each of
+        reach: ``Ways.reach``. A detour around parked teammates is not in it; each of
             its cells may cost the most.
     """
     cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
@@ -143,7 +136,7 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
     In missions that end on the ground, no UAV is where a slot takes one percent: there the time may
     lack, and not the battery.
     """
-    if lands(mission) and not has_consumption(mission):
+    if lands(mission) and not has_costs(mission):
         return False
     u = uavs[i]
     spent = battery_home(mission, uavs, i, chart, planned, u.x, u.y, home, reach)
@@ -167,7 +160,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     else:
         closed = _closed_cells(mission, uavs, i, chart, None, home.x, home.y)
     width, slots = chart.zones.shape[1], uavs[i].slots_per_cell
-    least = reach[chart.nearest[home.y, home.x], slots - 1].ravel()
+    least = reach[mission.energy, chart.nearest[home.y, home.x], slots - 1].ravel()
     start = np.int64(y * width + x)
     waits = dearest_slot(mission) * longest_charge(mission, uavs)
     through = np.int64(least[start]) + waits
@@ -188,7 +181,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
             if not is_open(chart, next_x, next_y):
                 continue
             to = next_y * width + next_x
-            cost = spent[cell] + battery_of_move(mission, slots, action, next_x, next_y)
+            cost = spent[cell] + move_cost(mission, slots, action, next_x, next_y)
             if cost < spent[to]:
                 spent[to] = cost
                 left = np.int64(least[to])
@@ -197,34 +190,16 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
 
 
 @inlined
-def battery_of_move(mission, slots, action, x, y):
-    """The battery for a move of so many slots into a cell."""
-    if has_consumption(mission):
-        return slots * slot_cost(mission, slots, action)
-    return slots + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
-
-
-@inlined
-def _dearest_move(mission, u):
-    """The battery that a move of UAV ``u`` takes at most."""
-    if has_consumption(mission):
-        return u.slots_per_cell * mission.dearest_slot
-    return u.slots_per_cell + mission.wind_most
-
-
-@inlined
 def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
-    """The battery for a way home of so many cells, those of a detour included."""
+    """The battery for a way home of so many cells, those of a detour included [% / 1000]."""
     if reach is None or len(reach) == 0:
-        return cells
-    if lasts(mission, u):
-        return cells * u.slots_per_cell
-    dearest = _dearest_move(mission, u)
+        return PERCENT * cells
+    dearest = u.slots_per_cell * dearest_slot(mission)
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
     detour = cells - distance(chart, x, y, home_x, home_y)
     home = chart.nearest[home_y, home_x]
-    return reach[home, u.slots_per_cell - 1, y, x] + detour * dearest
+    return reach[mission.energy, home, u.slots_per_cell - 1, y, x] + detour * dearest
 
 
 @inlined
@@ -240,19 +215,14 @@ def round_trip(mission, u, chart, x, y, home, reach):
         cells = distance(chart, x, y, near[0], near[1])
         back = min(back, battery_of_way(mission, u, chart, x, y, near[0], near[1], cells, reach))
     cells = distance(chart, u.x, u.y, x, y)
-    if reach is None or len(reach) == 0:
-        return cells + back
-    if has_consumption(mission):
-        return battery_of_flight(mission, u.slots_per_cell, x - u.x, y - u.y, cells) + back
-    along_x = mission.wind_east if x > u.x else mission.wind_west
-    along_y = mission.wind_south if y > u.y else mission.wind_north
-    against = max(along_x * abs(x - u.x), 0.0) + max(along_y * abs(y - u.y), 0.0)
-    return cells * u.slots_per_cell + int(against) + back
+    if is_calm(reach):
+        return PERCENT * cells + back
+    return battery_of_flight(mission, u.slots_per_cell, x - u.x, y - u.y, cells) + back
 
 
 @inlined
 def battery_of_flight(mission, slots, east, south, cells):
-    """The battery for a flight in missions whose slots have costs of their own.
+    """The battery for a flight, without gusts [% / 1000].
 
     Args:
         mission: ``MISSION`` record.

@@ -13,7 +13,7 @@ from dess.model.guard import guard
 from dess.model.rules import launch
 from dess.model.state import HOVER, State, starts_of, state_of
 from dess.model.view import View
-from dess.model.ways_home import reach_of
+from dess.model.ways import is_calm
 from dess.policies.heuristics import AGE, GREEDY, NEAREST
 from dess.scenario.scenario import ScenarioSpace
 from tests import compiled
@@ -122,18 +122,18 @@ def test_a_sea_mirrored_or_turned_is_the_same(case):
     """Moves, ways, masks of the guard and the battery that it counts on."""
     space, team, data, _ = case
     plain = _sea(space, team, data)
-    reach, mask = reach_of(plain.state.missions, space.chart), guard(plain.view)
+    reach, mask = plain.view.ways.reach, guard(plain.view)
     after = _sea(space, team, data).state
     compiled.resolve(after.missions[0], after.uavs[0], space.chart)
     for turn in Turn.all_of(space):
         turned = _sea(turn.sea(space), _turned(turn, team), data)
         chart = turned.space.chart
-        if reach is not None:
-            other = reach_of(turned.state.missions, chart)
+        if not is_calm(reach):
+            other = turned.view.ways.reach
             homes = [chart.nearest[turn.cell(*home)[::-1]] for home in space.chart.parking]
             for y, x in np.ndindex(space.chart.zones.shape):
                 a, b = turn.cell(x, y)
-                assert (other[homes, :, b, a] == reach[:, :, y, x]).all()
+                assert (other[0][homes, :, b, a] == reach[0, :, :, y, x]).all()
         alike = _decides_alike(plain, turned, turn)
         event(f"alike {alike}")
         if alike:
@@ -155,7 +155,7 @@ def _decisions(sea: Sea, name: str) -> list[tuple[int, int, int, int]]:
     And who may be in the way of the step; none of this depends on how ties are decided.
     """
     mission, team, chart = sea.state.missions[0], sea.state.uavs[0], sea.space.chart
-    nodes, view, reach = np.array(sea.space.nodes), sea.view, reach_of(sea.state.missions, chart)
+    nodes, view, reach = np.array(sea.space.nodes), sea.view, sea.view.ways.reach
     found = []
     for i, action in zip(view.uav, policies.load(name).act(view), strict=True):
         node = compiled.goal(

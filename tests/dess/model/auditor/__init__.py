@@ -3,7 +3,7 @@
 It knows only the page ``docs/concepts/model.md`` and the constants of the scenario, and imports
 nothing of dess. What the log decides is taken from it: start cells, initial data, the actions that
 the UAVs asked for, the SNR of the nodes that were served, the new data, the failures and repairs,
-and the battery that the wind costs. All else is computed anew and compared with the log, row by
+and the battery that gusts cost. All else is computed anew and compared with the log, row by
 row. What is taken from the log must be possible.
 
     report = audit(record.events.columns(), scenario.model_dump())

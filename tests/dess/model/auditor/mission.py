@@ -55,7 +55,10 @@ class _Auditor:
             self._replay_slot()
         if self.fleet.costs:
             for i, u in enumerate(self.fleet.uavs):
-                self.fleet.take("remainder", self.log.slot, i, value=u.remainder)
+                found = int(self.log.next_row.value)
+                is_possible = u.remainder <= found <= u.largest_remainder
+                self.log.require(is_possible, "the remainder of a battery")
+                self.fleet.take("remainder", self.log.slot, i, value=found)
         for i in range(len(self.fleet.uavs)):
             self.fleet.take("mission_end", self.log.slot, i)
         self.nodes.end()

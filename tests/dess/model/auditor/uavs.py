@@ -14,14 +14,16 @@ HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
 # Counters of a UAV, and the slots that its move takes after the present one.
 _ZEROS = ("communications", "slots_flying", "slots_charging", "slots_waiting", "slots_grounded")
-_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged", "remainder")
+_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged")
+_ZEROS += ("remainder", "largest_remainder")
 
 
 class Uav(SimpleNamespace):
     """What is known of a UAV.
 
-    ``requested`` is the slot in which it asked for a pad, ``other`` who overruled it in this slot:
-    -1 for the edge of the grid or a no-fly cell.
+    In gusts, the thousandths that it has spent of the next percent are ``remainder`` at least and
+    ``largest_remainder`` at most. ``requested`` is the slot in which it asked for a pad, ``other``
+    who overruled it in this slot: -1 for the edge of the grid or a no-fly cell.
     """
 
     def __init__(self, **known: Any):
@@ -69,8 +71,16 @@ class Fleet:
         self.pushes = {s: a + b for s, a, b in zip(STEPS, moves, pushes, strict=False)}
         self.gusts = LARGEST_DEVIATE * wind["gusts"]
         self.costs = constants.get("consumption", {}).get("slots", ())
-        # The surcharges that have been seen: the field does not change in a mission.
-        self.seen: dict[tuple[int, ...], int] = {}
+        if any((strength, wind["gusts"], *moves)):
+            self.costs = [[*self._costs_of_moves(0.0, s), 1000] for s in range(1, 9)]
+        # What moves into cells may cost at the least and at the most, by what has been seen: the
+        # field does not change in a mission.
+        self.seen: dict[tuple[int, ...], tuple[int, int]] = {}
+
+    def _costs_of_moves(self, gust: float, slots: int) -> list[int]:
+        """What a slot of each move takes [% / 1000], with so much of a gust against it [%]."""
+        against = [max(self.pushes[step] + gust, 0.0) / slots for step in STEPS[:HOVER]]
+        return [1000 + math.ceil(1000 * push - 1e-6) for push in against]
 
     @property
     def active(self) -> list[tuple[int, Uav]]:
@@ -210,37 +220,49 @@ class Fleet:
             u.slots_waiting += u.waits
             if u.flies and not self.stands(u):
                 u.slots_flying += 1
-                if self.costs:
+                if self.gusts and self.c["flight_cost"]:
+                    self._spend_in_gusts(u)
+                elif self.costs:
                     self._spend_thousandths(u)
-                    continue
-                u.battery -= self.c["flight_cost"]
-                step = u.x - u.from_x, u.y - u.from_y
-                if step != (0, 0) and u.slots_left == u.slots_per_cell - 1 and u.battery > 0:
-                    self._check_wind(u, step)
-                    u.battery = u.logged_battery
+                else:
+                    u.battery -= self.c["flight_cost"]
 
     def _spend_thousandths(self, u: Uav) -> None:
         """Let a UAV lose what its slot costs; whole percents leave the battery."""
         step = STEPS.index((u.x - u.from_x, u.y - u.from_y))
         spent = u.remainder + self.c["flight_cost"] * self.costs[u.slots_per_cell - 1][step]
         u.battery = max(u.battery - spent // 1000, 0)
-        u.remainder = spent % 1000
+        u.remainder = u.largest_remainder = spent % 1000
 
-    def _check_wind(self, u: Uav, step: tuple[int, int]) -> None:
-        """The wind may cost what the log has, and always the same."""
-        against = self.pushes[step]
-        least = math.floor(max(against - self.gusts + 1e-9, 0.0))
-        most = math.ceil(max(against + self.gusts - 1e-9, 0.0)) if self.c["flight_cost"] else 0
-        extra = u.battery - u.logged_battery
-        if u.logged_battery == 0:  # the battery did not suffice for the rest of the surcharge
-            self.log.require(extra <= most, "the wind cannot cost that much")
+    def _spend_in_gusts(self, u: Uav) -> None:
+        """Let a UAV lose what the log has, which its cell may cost, and always the same."""
+        step, slots = (u.x - u.from_x, u.y - u.from_y), u.slots_per_cell
+        action = STEPS.index(step)
+        least = most = self.costs[slots - 1][action]
+        if action != HOVER:
+            least = self._costs_of_moves(-self.gusts, slots)[action]
+            most = self._costs_of_moves(self.gusts, slots)[action]
+        if u.logged_battery == 0:  # the battery need not have sufficed
+            is_possible = u.largest_remainder + most >= 1000 * u.battery
+            self.log.require(is_possible, "the wind cannot cost that much")
+            u.battery, u.remainder, u.largest_remainder = 0, 0, 999
             return
-        known = self.seen.setdefault((*u.cell, *step), extra)
-        opposite = self.seen.get((*u.cell, -step[0], -step[1]), 0)
-        self.log.require(min(least, most) <= extra <= most, "the wind cannot cost that")
-        self.log.require(extra == known, "the wind has changed")
-        across = any(self.c.get("wind", {}).get("moves", ()))  # a wind from the side costs both
-        self.log.require(extra == 0 or opposite == 0 or across, "wind from both sides")
+        percent = 1000 * (u.battery - u.logged_battery)
+        low = max(least, percent - u.largest_remainder)
+        high = min(most, percent + 999 - u.remainder)
+        self.log.require(low <= high, "the wind cannot cost that")
+        if action != HOVER:
+            known = self.seen.get((*u.cell, *step, slots), (low, high))
+            low, high = max(low, known[0]), min(high, known[1])
+            self.log.require(low <= high, "the wind has changed")
+            self.seen[(*u.cell, *step, slots)] = low, high
+            opposite = self.seen.get((*u.cell, -step[0], -step[1], slots), (0, 0))
+            across = any(self.c.get("wind", {}).get("moves", ()))  # a wind from the side costs both
+            is_one = low <= 1000 or opposite[0] <= 1000 or across
+            self.log.require(is_one, "wind from both sides")
+        u.battery = u.logged_battery
+        u.remainder = max(u.remainder + low - percent, 0)
+        u.largest_remainder = min(u.largest_remainder + high - percent, 999)
 
     def take_moves(self) -> None:
         """Take the rows of the moves, which must be as they have been decided."""

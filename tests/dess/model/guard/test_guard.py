@@ -13,7 +13,7 @@ from dess.model.batch import simulate_batch
 from dess.model.guard import guard
 from dess.model.state import BATTERY, HOVER, STEP_X, STEP_Y
 from dess.model.view import View
-from dess.physics.wind import FIELDS, surcharges
+from dess.model.ways import move_costs
 from dess.scenario.scenario import load_scenario
 from tests import compiled
 from tests.dess.envs.episodes import placed
@@ -230,7 +230,7 @@ def test_in_wind_a_uav_flies_around_the_cell_that_a_teammate_will_take():
     assert np.nonzero(mask[2])[0].tolist() == [EAST]
 
 
-def _cheapest(extras, closed, start, end):
+def _cheapest(moves, closed, start, end):
     """The battery of the cheapest way between two cells that avoids a third."""
     spent = {start: 0}
     waiting = [(0, start)]
@@ -240,7 +240,7 @@ def _cheapest(extras, closed, start, end):
             to = (int(x + STEP_X[action]), int(y + STEP_Y[action]))
             if not (0 <= to[0] < 16 and 0 <= to[1] < 16) or to == closed:
                 continue
-            more = battery + 1 + int(extras[action, to[1], to[0]])
+            more = battery + int(moves[action, to[1], to[0]])
             if more < spent.get(to, more + 1):
                 spent[to] = more
                 heapq.heappush(waiting, (more, to))
@@ -259,19 +259,21 @@ def test_in_wind_a_late_uav_takes_the_cheapest_way_around_a_parked_teammate(seed
     sea |= {"nodes": [[0, 0]], "charge_start": 29, "charge_complete": 100}
     parked = {"x": 12, "y": 8, "battery": 20, "charging": True, "pad_request": 3, "latch": True}
     state, chart = placed([parked, {"x": 2, "y": 9, "latch": True}], **sea)
-    extras = surcharges((16, 16), *(state.missions[0][field].item() for field in FIELDS))
-    u = state.uavs[0, 1]
-    u["battery"] = _cheapest(extras, (12, 8), (2, 9), (13, 8)) + 1
+    mission, u = state.missions[0], state.uavs[0, 1]
+    moves = move_costs(mission, 1, (16, 16))
+    left = _cheapest(moves, (12, 8), (2, 9), (13, 8)) + int(mission["dearest_slot"])
     view = View(state, SimpleNamespace(chart=chart), np.zeros(1, int), np.ones(1, int))
-    while u["zone"] < 0 and u["battery"] > 0:
+    while u["zone"] < 0 and left > 0:
+        u["battery"], u["remainder"] = -(-left // 1000), -left % 1000
         action = np.nonzero(guard(view)[0])[0][0]
         if action != HOVER:
             u["x"] += STEP_X[action]
             u["y"] += STEP_Y[action]
-            u["battery"] -= extras[action, u["y"], u["x"]]
-        u["battery"] -= 1
+            left -= int(moves[action, u["y"], u["x"]])
+        else:
+            left -= 1000
         u["zone"] = chart.zones[u["y"], u["x"]]
-    assert u["battery"] == 1
+    assert left == mission["dearest_slot"]
 
 
 def test_a_uav_stays_in_its_parking_cell_whoever_is_near():

@@ -1,0 +1,151 @@
+"""The battery that the cheapest ways take.
+
+The cost of a way depends on what slots take of the battery (``dess.physics.energy``) and on the
+speed of the UAV. The missions of a batch may have different energies, each with a table of its
+own::
+
+    ways = Ways(starts.constants, chart)
+    ways.reach[e, c, s - 1, y, x]   # to parking cell c, for a UAV that takes s slots per cell
+    ways.home[e, s - 1, y, x]       # to the nearest zone cell
+
+where ``e`` is the field ``energy`` of a mission. Costs are in thousandths of a percent. Where every
+slot takes one percent, the return guard needs no table: distances tell the same.
+"""
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from dess.base.kernels import inlined, kernel
+from dess.model.state import MISSION
+from dess.physics.chart import NO_FLY, Chart, read_only
+from dess.physics.energy import ACTIONS, ENERGY, HOVERING, fill_move_costs
+
+FAR = 2**30  # further than any cell
+MOST_ENTRIES = 2**25  # of the tables of a batch: 128 MB
+
+
+# The tables of extended missions in which every cell costs one percent, which need none.
+_CALM = read_only(np.zeros((0, 0, 0, 0, 0), np.int32))
+
+
+@inlined
+def is_calm(reach):
+    """Whether every cell costs one percent, by the tables of ``Ways.reach``."""
+    return reach is None or len(reach) == 0
+
+
+class Ways:
+    """The tables of the missions of a batch, each of which is computed when it is first needed."""
+
+    def __init__(self, missions: np.ndarray, chart: Chart):
+        """Prepare the tables.
+
+        Args:
+            missions: ``MISSION`` records with each energy of the batch, which share their fleet.
+            chart: Their chart.
+        """
+        self._missions, self._chart = missions, chart
+
+    @cached_property
+    def reach(self) -> np.ndarray | None:
+        """(E, C, S, H, W) battery to each of C parking cells, for 1 to S slots per cell.
+
+        If every cell costs one percent, E is 0, or the table is None in missions without sections,
+        so that the compiler leaves out its code. If a table would be larger than 128 MB, S is 0:
+        then every cell may cost the most.
+        """
+        if "is_plain" in (self._missions.dtype.names or ()):  # neither wind nor slow UAVs
+            return None
+        first = self._missions[0]
+        if first["slowest"] == 1 and not first["has_costs"]:
+            return _CALM
+        return self._tables(len(self._chart.parking))
+
+    @cached_property
+    def home(self) -> np.ndarray:
+        """(E, S, H, W) battery from each cell to the nearest zone cell."""
+        return self._tables(1)[:, 0]
+
+    def _tables(self, groups: int) -> np.ndarray:
+        """(E, G, S, H, W) battery to the nearest of each of G groups of parking cells."""
+        chart = self._chart
+        sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
+        slowest = int(self._missions[0]["slowest"])
+        energies = self._missions["energy"]
+        tables = []
+        for number in range(int(energies.max()) + 1):
+            mission = self._missions[np.argmax(energies == number)]
+            tables.append(_filled(*sea, groups, slowest, _energy_of(mission)))
+        if len(tables) == 1:
+            return tables[0][None]
+        return read_only(np.stack(tables))
+
+
+def _energy_of(mission: np.void) -> bytes:
+    """A mission of which nothing is kept but what slots take."""
+    energy = np.zeros(1, MISSION)
+    for name in ("grid", *ENERGY):
+        energy[name] = mission[name]
+    return energy.tobytes()
+
+
+@lru_cache(maxsize=64)
+def _filled(
+    shape: tuple[int, int], zones: bytes, parking: bytes, groups: int, slowest: int, energy: bytes
+) -> np.ndarray:  # fmt: skip
+    """(G, S, H, W) battery to the nearest of each of G groups of parking cells."""
+    cells = np.frombuffer(zones, np.int8).reshape(shape)
+    if groups * slowest * cells.size > MOST_ENTRIES:
+        return read_only(np.zeros((groups, 0, 0, 0), np.int32))
+    mission = np.frombuffer(energy, MISSION)[0]
+    table = np.full((groups, slowest, *shape), FAR, np.int32)
+    for s in range(slowest):
+        moves = move_costs(mission, s + 1, shape)
+        for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
+            table[group, s, homes[:, 1], homes[:, 0]] = 0
+            relax(cells, moves, table[group, s], False)
+    return read_only(table)
+
+
+def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) -> np.ndarray:
+    """(4, H, W) what the moves north, east, south and west into a cell take [% / 1000]."""
+    moves = np.empty((HOVERING, *shape), np.int64)
+    if mission["gusts"] > 0:
+        fill_move_costs(mission, slots_per_cell, moves)
+    else:
+        costs = mission["slot_costs"].reshape(-1, ACTIONS)[slots_per_cell - 1, :HOVERING]
+        moves[:] = slots_per_cell * costs.astype(np.int64)[:, None, None]
+    return moves
+
+
+@kernel
+def relax(zones, moves, costs, outward):
+    """Lower the costs of all cells to those of the cheapest ways (Bellman and Ford's algorithm).
+
+    Args:
+        zones: (H, W) as in ``Chart``.
+        moves: (4, H, W) what the moves north, east, south and west into a cell cost.
+        costs: (H, W) the costs; 0 where the ways end and ``FAR`` elsewhere.
+        outward: Whether the ways lead from there to the cells, and not back.
+    """
+    rows, columns = zones.shape
+    changed, forth = True, True
+    while changed:
+        changed = False
+        for place in range(zones.size):
+            cell = place if forth else zones.size - 1 - place
+            y = cell // columns
+            x = cell % columns
+            if zones[y, x] == NO_FLY:
+                continue
+            for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+                a = x + step_x
+                b = y + step_y
+                if 0 <= a < columns and 0 <= b < rows and costs[b, a] < FAR:
+                    move = moves[(action + 2) % 4, y, x] if outward else moves[action, b, a]
+                    cost = min(costs[b, a] + move, FAR - 1)
+                    if cost < costs[y, x]:
+                        costs[y, x] = cost
+                        changed = True
+        forth = not forth
