@@ -47,10 +47,8 @@ ROOMS = {
         *("interrupts", "cli"),
     ),
 }
-# Former names, which can be imported for one more release.
-FORMER = {f"dess.{name}" for name in ("env", "guard", "integrations", "observations")}
 # What only gathers the names of a floor, or begins the command.
-FACADES = {"dess", "dess.__main__", "dess.api", *FORMER, *(f"dess.{floor}" for floor in FLOORS)}
+FACADES = {"dess", "dess.__main__", "dess.api", *(f"dess.{floor}" for floor in FLOORS)}
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and only trainings need it.
@@ -267,7 +265,7 @@ def test_libraries_are_imported_by_their_owners_alone(libraries, owners):
     """And the modules of integrations by nobody."""
     users = users_of(libraries)
     assert users and all(name.startswith(owners) for name in users)
-    for name in SOURCES.keys() - FORMER:
+    for name in SOURCES:
         of_integrations = {m for m in imports_of(name) if m.startswith(INTEGRATIONS)}
         assert not of_integrations or name.startswith(INTEGRATIONS), name
 
