@@ -297,7 +297,7 @@ class Moments(NamedTuple):
         means = np.array([node.mean for node in nodes])
         ends = np.array([node.interval(metric)[1:] for node in nodes])
         worst, farthest, scale = worst_and_spread(means, ends, metric)
-        chosen = nodes[farthest]
+        chosen = nodes[int(farthest)]
         mean = means[worst]
         return cls(
             n=chosen.n,

@@ -286,7 +286,7 @@ def _running_interval_in(
     """The ``running_interval`` of a metric of missions, with the range that it has in them."""
     values = values_in(sample, metric)
     measure = metric_in_missions(sample, metric)
-    nodes = NODES_BEHIND.get(metric)
+    nodes = NODES_BEHIND.get(metric, "")
     if nodes in sample:
         return running_interval_of_worst(measure, np.stack([*sample[nodes]]))
     return running_interval(measure, values)
