@@ -296,9 +296,10 @@ class Moments(NamedTuple):
         """
         means = np.array([node.mean for node in nodes])
         ends = np.array([node.interval(metric)[1:] for node in nodes])
-        worst, farthest, scale = worst_and_spread(means, ends, metric)
+        worst, farthest, wider = worst_and_spread(means, ends, metric)
         chosen = nodes[int(farthest)]
-        mean = means[worst]
+        mean = float(means[worst])
+        scale = float(wider)
         return cls(
             n=chosen.n,
             total=mean * chosen.n,
