@@ -30,16 +30,17 @@ from dess.analysis.names import PARAMETERS, field_named, value_text
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare, compare_pairs, for_choice
+from dess.analysis.stats.front import on_front
 from dess.analysis.stats.intervals import LEVEL, by_replication, share_interval, values_within
 from dess.analysis.stats.verdict import (
-    ABOVE,
-    BELOW,
+    BETTER,
     INCONCLUSIVE,
     NOT_RULED_OUT,
-    SEEN_ABOVE,
-    SEEN_BELOW,
+    SEEN_BETTER,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
     judge_by_tests,
-    on_front,
 )
 from dess.analysis.study.stopping import Text
 from dess.base.errors import unknown_name
@@ -183,12 +184,12 @@ def _plot_distribution(values: np.ndarray, pair: Pair) -> Figure:
     x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
     y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
     with style.new_panels(3.9) as (figure, ax):
-        for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
+        for start, end, outcome in ((x[0], 0, WORSE), (0, x[-1], BETTER)):
             ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
         ax.fill_between(x, *band, step="post", **style.band(style.INK), gid="band")
         ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
-        shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
+        shares = {WORSE: (values < 0).mean(), BETTER: (values > 0).mean()}
         for place, (outcome, share) in enumerate(shares.items()):
             ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (place, 1.03),
                         ha=("left", "right")[place], xycoords="axes fraction",
@@ -314,20 +315,11 @@ def _count_mission_ends(results: Results, policy: str, replications: Iterable[in
 BINS = 5  # largest number of bins of a parameter
 LEAST = 10  # missions of a bin that is shown
 EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
-AHEAD, BEHIND = "ahead", "behind"
-SEEN_AHEAD, SEEN_BEHIND = "ahead in what was seen", "behind in what was seen"
-VERDICTS = {
-    ABOVE: AHEAD,
-    SEEN_ABOVE: SEEN_AHEAD,
-    INCONCLUSIVE: INCONCLUSIVE,
-    SEEN_BELOW: SEEN_BEHIND,
-    BELOW: BEHIND,
-}
 COLOURS = {
-    AHEAD: style.BETTER,
-    SEEN_AHEAD: style.BETTER,
-    BEHIND: style.WORSE,
-    SEEN_BEHIND: style.WORSE,
+    BETTER: style.BETTER,
+    SEEN_BETTER: style.BETTER,
+    WORSE: style.WORSE,
+    SEEN_WORSE: style.WORSE,
     INCONCLUSIVE: style.MUTED,
 }
 
@@ -383,7 +375,7 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
     ends = ["difference", "low", "high", "p", "n", "student", "p_student"]
     table = pd.DataFrame(rows, columns=["field", "position", "value", *ends])
     table = for_choice(add_adjusted(table, "holm"), candidates)
-    verdicts = [VERDICTS[verdict] for verdict in judge_by_tests(table)]
+    verdicts = [better_or_worse(side, PRODUCT) for side in judge_by_tests(table)]
     return table.rename(columns={"difference": "mean"}).assign(verdict=verdicts)
 
 
@@ -395,10 +387,10 @@ def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
         pair: The policies.
     """
     meanings = {
-        AHEAD: f"{pair.policy} is ahead where a dot is blue",
-        BEHIND: f"{pair.policy} is behind where a dot is orange",
-        SEEN_AHEAD: f"a hollow blue dot is ahead in what was seen, where {NOT_RULED_OUT}",
-        SEEN_BEHIND: f"a hollow orange dot is behind in what was seen, where {NOT_RULED_OUT}",
+        BETTER: f"{pair.policy} is better where a dot is blue",
+        WORSE: f"{pair.policy} is worse where a dot is orange",
+        SEEN_BETTER: f"a hollow blue dot is better in what was seen, where {NOT_RULED_OUT}",
+        SEEN_WORSE: f"a hollow orange dot is worse in what was seen, where {NOT_RULED_OUT}",
         INCONCLUSIVE: "a hollow grey dot is inconclusive",
     }
     shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
@@ -437,7 +429,7 @@ def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
-            if verdict in (AHEAD, BEHIND):
+            if verdict in (BETTER, WORSE):
                 fillstyle = "full"
             else:
                 fillstyle = "none"

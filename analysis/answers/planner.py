@@ -22,12 +22,13 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import summary
 from dess.analysis.stats.verdict import (
-    ABOVE,
-    BELOW,
+    BETTER,
     INCONCLUSIVE,
     NOT_RULED_OUT,
-    SEEN_ABOVE,
-    SEEN_BELOW,
+    SEEN_BETTER,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
     judge_difference,
 )
 from dess.analysis.tables import BARS
@@ -36,10 +37,10 @@ from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 
 _CLAIMS = {
-    ABOVE: "The planner is better",
-    SEEN_ABOVE: f"The planner is better in what was seen; {NOT_RULED_OUT}",
-    BELOW: "The learner is better",
-    SEEN_BELOW: f"The learner is better in what was seen; {NOT_RULED_OUT}",
+    BETTER: "The planner is better",
+    SEEN_BETTER: f"The planner is better in what was seen; {NOT_RULED_OUT}",
+    WORSE: "The learner is better",
+    SEEN_WORSE: f"The learner is better in what was seen; {NOT_RULED_OUT}",
     INCONCLUSIVE: "The missions do not tell which is better",
 }
 
@@ -76,7 +77,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
     points = numbers.format_points(overall.difference, overall.low, overall.high)
-    verdict = judge_difference(overall)
+    verdict = better_or_worse(judge_difference(overall), PRODUCT)
     sentence = (
         f"{_CLAIMS[verdict]}: the product of {planner} minus that of "
         f"{overall.baseline} is {points} points over {overall.n:,} missions."
@@ -84,7 +85,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     if verdict == INCONCLUSIVE:
         return sentence, ""
     number = f"{numbers.format_difference(overall.difference, 0)} points"
-    if verdict in (SEEN_ABOVE, SEEN_BELOW):
+    if verdict in (SEEN_BETTER, SEEN_WORSE):
         number += " in what was seen"
     return sentence, number
 
