@@ -679,6 +679,7 @@ def _describe_metrics(
             "unit": metric.unit,
             "less": metric.less_is_better,
             "neutral": metric.is_neutral,
+            "isOutcome": metric.is_outcome,
             "isOffered": name in offered and not metric.is_neutral,
             "option": _REQUIRED.get(name, ""),
             "tolerance": _tolerance_of(name, tolerance, space),

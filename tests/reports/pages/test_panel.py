@@ -15,8 +15,22 @@ from playwright.sync_api import Page as Tab
 
 from dess import InputError, load_scenario, policies, simulate_batch
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
+from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.requirement import Requirement
-from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
+from dess.analysis.stats.sequences import (
+    add_values,
+    ends_of_what_was_seen,
+    new_sequence,
+    sequence_ends,
+)
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_ABOVE,
+    position_of,
+    position_with_allowance,
+)
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
@@ -42,6 +56,12 @@ PAPER = load_scenario("paper")
 SEED = 7
 MISSIONS = 120  # of a run
 PATIENCE = 60_000  # ms
+# How the panel begins to say the verdict on a difference.
+SAID = {
+    ABOVE: "decided: B is higher",
+    SEEN_ABOVE: f"{SEEN_ABOVE.removeprefix('above ')}, B is higher, which is better; ",
+    INCONCLUSIVE: "no",
+}
 
 
 @pytest.fixture(scope="module")
@@ -304,6 +324,34 @@ def test_the_page_simulates_what_python_does(visit, document):
     )
     assert opened.complaints == []
     assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
+
+
+def test_what_is_decided_but_for_a_rare_failure_is_so_in_what_was_seen(visit, document):
+    """As the verdict of a study: its words, and its rule with intervals that may be watched."""
+    few = 30
+    sides = [
+        simulate_batch(load_scenario("paper", uavs=uavs), policies.load("greedy"), SEED, few)
+        for uavs in (1, 2)
+    ]
+    tab = visit(document, 1280).page
+    run(tab, few)
+    verdicts = set()
+    for metric in METRICS:
+        before, after = (records.missions[metric].astype(float) for records in sides)
+        bound = 1.0 if metric_of(metric).is_bounded else np.inf
+        sequence = new_sequence(-bound, bound, failure=metric_of(metric).failure)
+        add_values(sequence, after - before)
+        low, high = sequence_ends(sequence)
+        whole = position_of(Interval(0.0, low, high))
+        without = position_of(Interval(0.0, *ends_of_what_was_seen(sequence)))
+        verdict = position_with_allowance(whole, without)
+        if metric_of(metric).is_outcome:
+            verdict = whole
+        said = cells_of(tab, metric_of(metric).name)[3]
+        verdicts.add(verdict)
+        assert said.startswith(SAID[verdict]), metric
+        assert (NOT_RULED_OUT in said) == (verdict == SEEN_ABOVE), metric
+    assert SEEN_ABOVE in verdicts
 
 
 def test_what_is_neither_better_nor_worse_is_not_called_so(visit, tmp_path):
