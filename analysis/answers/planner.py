@@ -9,10 +9,13 @@ import seaborn as sns
 from matplotlib.figure import Figure
 
 from dess.analysis import numbers
-from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Times, plot_decision_times
 from dess.analysis.answers.missions import data_by_node, data_by_uav_and_node
 from dess.analysis.answers.optimality import ALL
+from dess.analysis.answers.policies.decision_times import (
+    Times,
+    decision_time_front,
+    plot_decision_times,
+)
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures import comparison as figures
 from dess.analysis.figures import missions as maps
@@ -119,7 +122,7 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     """
     means = summary(results.missions, by=["policy"]).query("metric == @PRODUCT")
     seconds = {cost.policy: cost.median for cost in times.costs}
-    points = comparison.decision_time_front(means[["policy", "mean", "low", "high"]], seconds)
+    points = decision_time_front(means[["policy", "mean", "low", "high"]], seconds)
     return Drawing(
         plot_decision_times(points),
         "Decision time against the product of all policies, and their Pareto front",

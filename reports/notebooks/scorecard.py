@@ -25,7 +25,7 @@ from pathlib import Path
 from IPython.display import display
 
 from dess.analysis import load_results, numbers
-from dess.analysis.answers.learning import read_curves
+from dess.analysis.answers.training.curves import read_curves
 from dess.analysis.figures.comparison import plot_claims
 from dess.analysis.paper import scorecard, values
 from dess.analysis.results.chunks import MANIFEST

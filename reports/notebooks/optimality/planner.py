@@ -21,19 +21,31 @@ learner = "ddqn"  # the policy that has learned
 
 # %%
 from dess.analysis import load_results, numbers, tables
-from dess.analysis.answers import comparison, optimality, summary
+from dess.analysis.answers import optimality, summary
 from dess.analysis.answers import planner as answers
+from dess.analysis.answers.policies.decision_times import (
+    decision_time_sentences,
+    read_decision_times,
+    time_table,
+)
+from dess.analysis.answers.policies.pairs import pair_missions, pair_of
+from dess.analysis.answers.policies.parameter_bins import (
+    LEAST,
+    colours_in_words,
+    differences_along_parameters,
+    draw_differences_along_parameters,
+)
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.comparison import plot_gaps
 from dess.reports.pages import html
 
 # %%
 study, bounded = (load_results(f"{results}/{name}") for name in ("planning", "gap"))
-times = comparison.read_decision_times(results, study)
+times = read_decision_times(results, study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
 differences = answers.compare_with_learner(study, planners, learner)
-pair = comparison.pair_of(study, planner, learner)
-missions = comparison.pair_missions(study, pair)
+pair = pair_of(study, planner, learner)
+missions = pair_missions(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
@@ -46,15 +58,13 @@ html.lead_figure(*answers.by_fleet(differences))
 # ## Why: where each of them is ahead
 
 # %%
-lead = comparison.differences_along_parameters(missions, pair.candidates)
-html.write_markdown("{colours}", colours=comparison.colours_in_words(lead, pair))
+lead = differences_along_parameters(missions, pair.candidates)
+html.write_markdown("{colours}", colours=colours_in_words(lead, pair))
 
 # %%
-too_few = html.write_markdown(
-    "Too few missions for bins of n = {least} or more.", least=comparison.LEAST
-)
+too_few = html.write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
 html.show_parts(
-    comparison.draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few
+    draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few
 )
 
 # %%
@@ -121,13 +131,13 @@ html.make_table(
 )
 
 # %%
-html.make_table(comparison.time_table(times), "Time of a decision for the UAVs of a mission")
+html.make_table(time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.write_markdown("{remarks}", remarks=comparison.decision_time_sentences(times, study, pair))
+html.write_markdown("{remarks}", remarks=decision_time_sentences(times, study, pair))
 
 # %%
 html.provenance_table([study, bounded])

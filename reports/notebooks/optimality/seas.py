@@ -21,7 +21,8 @@ heuristic = "greedy"  # a fast policy without learning
 
 # %%
 from dess.analysis import load_results, tables
-from dess.analysis.answers import comparison, seas
+from dess.analysis.answers import seas
+from dess.analysis.answers.policies.decision_times import read_decision_times
 from dess.analysis.metrics import METRICS, SUCCESS
 from dess.reports.pages import html
 
@@ -32,7 +33,7 @@ study, landing, horizon = (
 reference = reference or seas.reference_of(study)
 for name in (policy, reference, heuristic):
     study.check_policy(name)
-times = comparison.read_decision_times(results, study)
+times = read_decision_times(results, study)
 
 # %%
 html.make_answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
