@@ -26,9 +26,13 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare, difference_test, differences_of, t_test
 from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
 from dess.analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
     BETTER,
     INCONCLUSIVE,
     NOT_RULED_OUT,
+    SEEN_ABOVE,
+    SEEN_BELOW,
     SEEN_BETTER,
     SEEN_WORSE,
     WORSE,
