@@ -302,13 +302,14 @@ def test_snippets_run(source, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out
 
 
-def test_the_code_on_the_page_of_the_processes_is_that_of_the_model():
+def test_the_site_shows_the_processes_as_they_are_in_the_code():
     source = (ROOT / "dess" / "model" / "mission.py").read_text("utf-8")
-    quoted = blocks(PAGES["docs/concepts/processes.md"], "python")
-    assert quoted
-    for block in quoted:
-        is_current = indent(block, " " * 4) in source
-        assert is_current, f"another one now; copy it anew: {block.splitlines()[0]}"
+    shown_parts = hooks.PART.findall(PAGES["docs/concepts/processes.md"])
+    assert {part for part, _ in shown_parts} == {"code"}
+    for _, process in shown_parts:
+        (shown_code,) = blocks(hooks.code(process), "python")
+        assert shown_code.startswith(f"def {process}(self")
+        assert indent(shown_code, " " * 4) in source
 
 
 def test_the_policy_of_the_how_to_page_collects(outside):

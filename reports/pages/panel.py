@@ -23,7 +23,6 @@ from IPython.display import HTML, Markdown
 from markupsafe import Markup
 
 from dess import InputError, simulate_batch
-from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
 from dess.analysis.metrics import (
@@ -38,6 +37,8 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.verdict import rule_for_pages
 from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
@@ -205,6 +206,7 @@ class Panel(Document):
             "fixed": [f"{key}={toml_value(self.given[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
+            "rule": rule_for_pages(),
             "prices": [*_describe_prices(self.costs)],
             "priced": [*_other_prices(self.costs)],
             "grid": self._grid(settings),
