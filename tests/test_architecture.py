@@ -18,7 +18,7 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
-        *("model.state", "model.ways_home", "model.channel", "model.rules", "model.events"),
+        *("model.state", "model.ways", "model.channel", "model.rules", "model.events"),
         *(
             "model.record",
             "model.packets",

@@ -14,8 +14,8 @@ HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
 # Counters of a UAV, and the slots that its move takes after the present one.
 _ZEROS = ("communications", "slots_flying", "slots_charging", "slots_waiting", "slots_grounded")
-_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged")
-_ZEROS += ("remainder", "largest_remainder")
+_ZEROS += ("collected", "reward", "slots_left", "charge_slots", "charged", "remainder")
+_ZEROS += ("largest_remainder",)
 
 
 class Uav(SimpleNamespace):
