@@ -90,7 +90,7 @@ def _energy_of(mission: np.void) -> bytes:
     return energy.tobytes()
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _filled(
     shape: tuple[int, int], zones: bytes, parking: bytes, groups: int, slowest: int, energy: bytes
 ) -> np.ndarray:  # fmt: skip
@@ -121,7 +121,10 @@ def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) ->
 
 @kernel
 def relax(zones, moves, costs, outward):
-    """Lower the costs of all cells to those of the cheapest ways (Bellman and Ford's algorithm).
+    """Lower the costs of all cells to those of the cheapest ways.
+
+    A cell whose cost has been lowered is put into a queue, and its neighbours are looked at when it
+    comes out (Moore's algorithm). Most cells come there once, since ways of few cells cost least.
 
     Args:
         zones: (H, W) as in ``Chart``.
@@ -130,22 +133,34 @@ def relax(zones, moves, costs, outward):
         outward: Whether the ways lead from there to the cells, and not back.
     """
     rows, columns = zones.shape
-    changed, forth = True, True
-    while changed:
-        changed = False
-        for place in range(zones.size):
-            cell = place if forth else zones.size - 1 - place
-            y = cell // columns
-            x = cell % columns
-            if zones[y, x] == NO_FLY:
+    queue = np.empty(zones.size, np.int32)
+    waits = np.zeros(zones.size, np.bool_)
+    first, count = 0, 0
+    for cell in range(zones.size):
+        if costs[cell // columns, cell % columns] == 0:
+            queue[count] = cell
+            waits[cell] = True
+            count += 1
+    while count > 0:
+        cell = queue[first]
+        first = first + 1 if first + 1 < zones.size else 0
+        count -= 1
+        waits[cell] = False
+        y = cell // columns
+        x = cell - y * columns
+        for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+            a = x + step_x if outward else x - step_x
+            b = y + step_y if outward else y - step_y
+            if not (0 <= a < columns and 0 <= b < rows) or zones[b, a] == NO_FLY:
                 continue
-            for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-                a = x + step_x
-                b = y + step_y
-                if 0 <= a < columns and 0 <= b < rows and costs[b, a] < FAR:
-                    move = moves[(action + 2) % 4, y, x] if outward else moves[action, b, a]
-                    cost = min(costs[b, a] + move, FAR - 1)
-                    if cost < costs[y, x]:
-                        costs[y, x] = cost
-                        changed = True
-        forth = not forth
+            move = moves[action, b, a] if outward else moves[action, y, x]
+            cost = min(costs[y, x] + move, FAR - 1)
+            if cost >= costs[b, a]:
+                continue
+            costs[b, a] = cost
+            beside = b * columns + a
+            if not waits[beside]:
+                waits[beside] = True
+                last = first + count
+                queue[last if last < zones.size else last - zones.size] = beside
+                count += 1

@@ -67,11 +67,25 @@ class Pads:
     def _in_order(self, zone: int, state: str) -> list[int]:
         """The UAVs of a zone that wait or are charging, in the order of the queue."""
         rank = {
-            i: (u.battery * self.by_battery, u.requested, i)
+            i: (*self._battery_of(i, state), u.requested, i)
             for i, u in enumerate(self.fleet.uavs)
             if getattr(u, state) and self.fleet.zone_of(u) == zone
         }
         return sorted(rank, key=rank.__getitem__)
+
+    def _battery_of(self, i: int, state: str) -> tuple[float, ...]:
+        """The battery by which a UAV is sorted; of equal percents in gusts, the log decides."""
+        u = self.fleet.uavs[i]
+        if not self.by_battery:
+            return ()
+        if not self.fleet.gusts:
+            return (1000 * u.battery - u.remainder,)
+        if state == "charging":
+            return u.battery, u.battery - u.logged_battery
+        log = self.fleet.log
+        coming = (row for row in log.rows[log.place :] if row.event == "charge_start")
+        granted = [row.uav for row in coming if row.time == log.slot]
+        return u.battery, [*granted, i].index(i)
 
     def charge(self) -> None:
         """Charge the UAVs on the pads."""
