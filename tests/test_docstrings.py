@@ -61,7 +61,7 @@ def arguments_of(node: ast.AST) -> set[str]:
 def made_names() -> set[str]:
     """The names of all functions and classes, and of what modules and classes bind."""
     bound: set[str] = set()
-    for module, tree in SOURCES.items():
+    for module, tree in LIBRARY.items():
         bound |= bound_in(module).keys()
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
