@@ -164,8 +164,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
-    stands = lands(mission) and is_parked(mission, u) and home.gives_way == 0
-    if charge and (u.pad_request >= 0 or stands):
+    parked = is_parked(mission, u) and not (lands(mission) and home.gives_way == 1)
+    if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + dearest_slot(mission) * home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
@@ -181,7 +181,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
-        remains = action == HOVER and is_parked(mission, u)
+        remains = action == HOVER and parked
         contested = 0 if remains else contest(levels, action)
         gives_way = charge and home.gives_way == 1 and action == HOVER
         if not is_open(chart, x, y) or contested == 3 or gives_way:
@@ -215,14 +215,15 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if late == least:
             nearest |= bit
     elsewhere = nearest & ~(1 << HOVER)
-    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
+    if elsewhere and not parked and _is_in_the_way(mission, uavs, i):
         # a teammate may stay where it is, unless it is told to leave its cell, too
         leaves = elsewhere & empty or elsewhere & clear
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
             leaves = elsewhere & ~_ceded(mission, uavs, i)
         if u.overruled and u.zone >= 0 and is_tight(mission, chart):
-            # A teammate may want the same cell again and again, so it tries one after another.
-            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere
+            # A teammate may want the same cell again and again, so it tries one after another, and
+            # lets the teammate go first in some slots.
+            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere | 1 << HOVER
             leaves = _one_of(leaves, mission.slot)
         if leaves:
             return leaves
