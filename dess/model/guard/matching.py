@@ -16,7 +16,8 @@ from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import dearest_slot, late_slots, margin, margin_slots, usable_battery
 from dess.model.guard.queues import find_ways, is_given_up, needs_pad
 from dess.model.guard.ways import battery_of_way, is_parked
-from dess.physics.chart import distance, length_around
+from dess.model.state import STEP_X, STEP_Y
+from dess.physics.chart import distance, is_open, length_around
 from dess.physics.landing import lands
 
 # The price of a way home is the battery that it takes, and more for each unit that lacks for it and
@@ -60,7 +61,8 @@ def match_zones(mission, uavs, data, chart, plan, reach):
     """
     prices = np.full((mission.uavs, mission.zones), _NO_WAY, np.int64)
     zones = np.full(mission.uavs, -1, np.int64)
-    left = chart.sizes.copy()
+    closed = _kept_cells(mission, uavs, chart)
+    left = chart.sizes - _shut_cells(mission, uavs, chart, closed)
     for j in range(mission.uavs):
         u, turn = uavs[j], plan.turns[j]
         if not needs_pad(mission, u, data):
@@ -86,7 +88,7 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         plan.queues[zone].is_full = left[zone] <= 0
         plan.queues[zone].change = 0
         if left[zone] <= 0:
-            _match_cells(mission, uavs, zone, chart, plan.turns, reach)
+            _match_cells(mission, uavs, zone, chart, plan.turns, closed, reach)
 
 
 @inlined
@@ -103,14 +105,13 @@ def _price(mission, u, spent, slots):
 
 
 @shared_kernel
-def _match_cells(mission, uavs, zone, chart, turns, reach):
-    """Match the UAVs that come to a full zone to its cells.
+def _match_cells(mission, uavs, zone, chart, turns, closed, reach):
+    """Match the UAVs that come to a small zone to its cells.
 
     The sum of the squares of their ways is the least possible, so that of two UAVs on one line the
     first flies on to the deeper cell. It falls with each cell that UAVs fly on their ways, so that
     no UAVs change places with each other again and again.
     """
-    closed = _kept_cells(mission, uavs, chart)
     cells, count = np.empty(chart.sizes[zone], np.int64), 0
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
@@ -151,6 +152,27 @@ def _kept_cells(mission, uavs, chart):
             cells[count] = uavs[j].y * chart.zones.shape[1] + uavs[j].x
             count += 1
     return cells[:count]
+
+
+@shared_kernel
+def _shut_cells(mission, uavs, chart, closed):
+    """(Z,) How many cells of each zone no UAV can come to, since UAVs keep all cells beside them."""
+    shut = np.zeros_like(chart.sizes)
+    if len(closed) == 0:
+        return shut
+    width = chart.zones.shape[1]
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        is_open_beside = (closed == y * width + x).any()  # the UAV that keeps it is there
+        for j in range(mission.uavs):
+            is_open_beside = is_open_beside or (uavs[j].active and uavs[j].x == x and uavs[j].y == y)
+        for action in range(4):
+            beside_x, beside_y = x + STEP_X[action], y + STEP_Y[action]
+            is_kept = (closed == beside_y * width + beside_x).any()
+            is_open_beside = is_open_beside or (is_open(chart, beside_x, beside_y) and not is_kept)
+        if not is_open_beside:
+            shut[chart.zones[y, x]] += 1
+    return shut
 
 
 @shared_kernel

@@ -98,20 +98,22 @@ def _ceded(mission, uavs, i):
 
 
 @inlined
-def _into_cells_of_others(mission, u, chart, planned):
-    """The moves of UAV ``u`` into the zone cells that teammates chose before it.
+def _into_cells_of_others(mission, uavs, i, chart, memory):
+    """The moves of UAV ``i`` into zone cells of teammates that choose before it or have less battery.
 
-    Such a teammate has less battery. If its cell was taken shortly before it comes, it would have
-    to fly on to another.
+    If such a cell was taken shortly before the teammate comes, it would have to fly on to another.
 
     Returns:
         A bit for each action.
     """
-    moves = 0
+    u, moves = uavs[i], 0
     for j in range(mission.uavs):
-        if planned[j] < 0:
+        cell = memory.planned[j]
+        if cell < 0 and uavs[j].battery < u.battery:
+            cell = memory.plan.turns[j].cell
+        if j == i or cell < 0:
             continue
-        x, y = chart.parking[planned[j], 0], chart.parking[planned[j], 1]
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         for action in range(4):
             if u.x + STEP_X[action] == x and u.y + STEP_Y[action] == y:
                 moves |= 1 << action
@@ -140,7 +142,7 @@ def _is_in_the_way(mission, uavs, i):
 
 
 @inlined
-def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
+def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -157,13 +159,13 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home: The result of ``parking_cell``.
-        planned: As in ``Parking``, as ``parking_cell`` leaves it.
+        memory: ``parking_memory``, as ``parking_cell`` leaves it.
         reach: The table of ``reach_of``.
 
     Returns:
         The safe actions, a bit for each.
     """
-    u = uavs[i]
+    u, planned = uavs[i], memory.planned
     parked = is_parked(mission, u) and not (lands(mission) and home.gives_way == 1)
     if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
@@ -228,7 +230,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if leaves:
             return leaves
     if charge and least == 0 and lands(mission):
-        nearest = nearest & ~_into_cells_of_others(mission, u, chart, planned) or nearest
+        nearest = nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory) or nearest
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
@@ -401,7 +403,7 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
     home = stays(uavs[i])
     if charge or find_home:
         home = parking_cell(mission, uavs, i, data, chart, memory, reach)
-    return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory.planned, reach)
+    return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory, reach)
 
 
 def guard(view: View) -> np.ndarray:

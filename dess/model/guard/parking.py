@@ -115,11 +115,11 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         memory: ``parking_memory``.
         reach: The table of ``reach_of``.
     """
+    for j in range(mission.uavs):
+        memory.plan.turns[j].zone = memory.plan.turns[j].cell = -1
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
-    for j in range(mission.uavs):
-        memory.plan.turns[j].zone = memory.plan.turns[j].cell = -1
     if not may_wait(mission, uavs, data):
         if not is_tight(mission, chart):
             return _choose(mission, uavs, i, chart, memory, reach)

@@ -53,8 +53,8 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     length, between, beside = distance(chart, x, y, to_x, to_y), 0, 0
     for j in range(mission.uavs):
         closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
-        if planned is not None and closed_x == to_x and closed_y == to_y:
-            continue  # it waits there for its turn in this cell
+        if closed_x == to_x and closed_y == to_y:
+            continue  # it leaves the cell, or the UAV waits there for its turn in it
         if closed_x >= 0:
             before = distance(chart, x, y, closed_x, closed_y)
             more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length
