@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
-    from dess.analysis.answers.learning import marl_eval_data as marl_eval_data
-    from dess.analysis.answers.learning import rliable_scores as rliable_scores
+    from dess.analysis.answers.training.exports import marl_eval_data as marl_eval_data
+    from dess.analysis.answers.training.exports import rliable_scores as rliable_scores
     from dess.analysis.ask.answer import sweep as sweep
     from dess.analysis.ask.answer import what_if as what_if
     from dess.analysis.execution.evaluation import evaluate as evaluate
@@ -34,8 +34,8 @@ _HOME = {
     "Results": "results.tables",
     "load_results": "results.tables",
     "resimulate": "results.resimulate",
-    "rliable_scores": "answers.learning",
-    "marl_eval_data": "answers.learning",
+    "rliable_scores": "answers.training.exports",
+    "marl_eval_data": "answers.training.exports",
     "summary": "stats.intervals",
     "distribution": "stats.distribution",
     "bootstrap_interval": "stats.intervals",

@@ -407,7 +407,7 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
         return metric
     nodes = NODES_BEHIND.get(column)
     if nodes in missions:
-        metric = replace(metric, among=len(missions[nodes].iloc[0]))
+        metric = replace(metric, among=len(np.asarray(missions[nodes])[0]))
     least, most = ranges_of_missions(missions, column)
     return replace(metric, least=float(np.min(least)), most=float(np.max(most)))
 

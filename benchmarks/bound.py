@@ -1,4 +1,4 @@
-"""What the relaxations of the upper bound cost, one changed at a time (docs/concepts/bound.md).
+"""What the relaxations of the upper bound cost, one changed at a time (analysis/bound/proof.md).
 
     python benchmarks/bound.py --missions 20 --seed 777001
 

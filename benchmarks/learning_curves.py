@@ -21,7 +21,8 @@ import pandas as pd
 import pyarrow as pa
 
 from dess import simulate_batch
-from dess.analysis.answers.learning import SHIPPED, read_curves, trained_policies
+from dess.analysis.answers.training.curves import SHIPPED, read_curves
+from dess.analysis.answers.training.trained import trained_policies
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import read_table, write_table

@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dess import load_scenario, simulate_batch
 from dess.analysis import load_study, numbers
-from dess.analysis.answers.learning import read_curve
+from dess.analysis.answers.training.curves import read_curve
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.paper import values
 from dess.analysis.stats.differences import compare_pairs

@@ -1,8 +1,8 @@
 """What MkDocs builds into the site besides the pages of this folder.
 
 - A line ``<!-- [[ NAME ]] -->`` of a page becomes a part made from the code: the commands, the
-  fields of a scenario, the public names of a package, the changelog, a section of the README, a
-  rendered report.
+  fields of a scenario, the public names of a package, a process of the SimPy model, the changelog,
+  a section of the README, a rendered report.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
 - The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them,
@@ -11,12 +11,14 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
+from textwrap import dedent
 from typing import TYPE_CHECKING, Any
 
 import typer.main
@@ -24,6 +26,7 @@ from typer.cli import get_docs_for_click
 
 import dess
 from dess.analysis.names import declared_fields
+from dess.model.mission import Mission
 from dess.reports.cli.commands import app
 from dess.reports.pages.index import make_index
 
@@ -72,6 +75,12 @@ def names(package: str) -> str:
     found = [getattr(module, name) for name in module.__all__]
     documented = [thing for thing in found if hasattr(thing, "__qualname__")]  # no module
     return "\n\n".join(f"::: {thing.__module__}.{thing.__qualname__}" for thing in documented)
+
+
+def code(process: str) -> str:
+    """The source of a process of the SimPy model, or of a part of one."""
+    source = inspect.getsource(getattr(Mission, process))
+    return f"```python\n{dedent(source)}```"
 
 
 def changelog() -> str:
@@ -124,7 +133,7 @@ def reports() -> str:
 
 PARTS: dict[str, Callable[..., str]] = {
     part.__name__: part
-    for part in (commands, scenario_fields, names, changelog, readme, live, reports)
+    for part in (commands, scenario_fields, names, code, changelog, readme, live, reports)
 }
 
 

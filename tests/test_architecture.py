@@ -1,10 +1,9 @@
-"""The architecture: floors and rooms import downwards only, folders stay small."""
+"""The architecture: floors and rooms import downwards only."""
 
 import ast
 import json
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -33,7 +32,8 @@ ROOMS = {
     ),
     "policies": (
         *("shipped", "network", "adapter", "heuristics", "planner", "learner.config"),
-        *("learner.policy", "learner.trained", "learner.network", "learner.training"),
+        *("learner.policy", "learner.arrays", "learner.trained", "learner.network"),
+        "learner.training",
         *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
         "registry",
     ),
@@ -47,10 +47,8 @@ ROOMS = {
         *("interrupts", "cli"),
     ),
 }
-# Former names, which can be imported for one more release.
-FORMER = {f"dess.{name}" for name in ("env", "guard", "integrations", "observations")}
 # What only gathers the names of a floor, or begins the command.
-FACADES = {"dess", "dess.__main__", "dess.api", *FORMER, *(f"dess.{floor}" for floor in FLOORS)}
+FACADES = {"dess", "dess.__main__", "dess.api", *(f"dess.{floor}" for floor in FLOORS)}
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and only trainings need it.
@@ -184,13 +182,6 @@ def test_rooms_only_import_from_rooms_before_them(floor):
     assert not climbing
 
 
-@pytest.mark.parametrize("floor", FLOORS)
-def test_folders_have_at_most_twelve_modules(floor):
-    modules = [path for path in (ROOT / floor).rglob("*.py") if not path.name.startswith("__")]
-    folders = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
-    assert not {folder for folder, count in folders.items() if count > 12}
-
-
 def test_no_modules_import_each_other():
     graph = {name: imports_of(name) & set(SOURCES) for name in SOURCES}
     try:
@@ -267,7 +258,7 @@ def test_libraries_are_imported_by_their_owners_alone(libraries, owners):
     """And the modules of integrations by nobody."""
     users = users_of(libraries)
     assert users and all(name.startswith(owners) for name in users)
-    for name in SOURCES.keys() - FORMER:
+    for name in SOURCES:
         of_integrations = {m for m in imports_of(name) if m.startswith(INTEGRATIONS)}
         assert not of_integrations or name.startswith(INTEGRATIONS), name
 

@@ -302,13 +302,14 @@ def test_snippets_run(source, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out
 
 
-def test_the_code_on_the_page_of_the_processes_is_that_of_the_model():
+def test_the_site_shows_the_processes_as_they_are_in_the_code():
     source = (ROOT / "dess" / "model" / "mission.py").read_text("utf-8")
-    quoted = blocks(PAGES["docs/concepts/processes.md"], "python")
-    assert quoted
-    for block in quoted:
-        is_current = indent(block, " " * 4) in source
-        assert is_current, f"another one now; copy it anew: {block.splitlines()[0]}"
+    shown_parts = hooks.PART.findall(PAGES["docs/concepts/processes.md"])
+    assert {part for part, _ in shown_parts} == {"code"}
+    for _, process in shown_parts:
+        (shown_code,) = blocks(hooks.code(process), "python")
+        assert shown_code.startswith(f"def {process}(self")
+        assert indent(shown_code, " " * 4) in source
 
 
 def test_the_policy_of_the_how_to_page_collects(outside):
@@ -406,7 +407,8 @@ def test_the_sampling_of_ends_errs_as_the_page_says():
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves():
     curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
-    assert learning_curves.table(curves) in PAGES["docs/concepts/trainings.md"]
+    page = ROOT / "benchmarks" / "trainings.md"
+    assert learning_curves.table(curves) in page.read_text("utf-8")
     for variant in ("quick", "no transfer"):  # Fig. 3: three training seeds, the same budget
         runs = curves[curves["variant"] == variant].groupby("seed")["tick"].max()
         assert len(runs) >= 3

@@ -13,7 +13,7 @@ import pytest
 from pydantic import BaseModel
 
 from dess import InputError
-from dess.analysis.answers.comparison import Times
+from dess.analysis.answers.policies.decision_times import Times
 from dess.analysis.ask.limits import Limits
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.resimulate import Evidence

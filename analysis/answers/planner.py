@@ -1,6 +1,7 @@
 """Whether planning beats learning: a planner and a learner in the same missions of a study."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,27 +9,37 @@ import seaborn as sns
 from matplotlib.figure import Figure
 
 from dess.analysis import numbers
-from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Times, plot_decision_times
 from dess.analysis.answers.missions import data_by_node, data_by_uav_and_node
 from dess.analysis.answers.optimality import ALL
+from dess.analysis.answers.policies.decision_times import (
+    Times,
+    decision_time_front,
+    plot_decision_times,
+)
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures import comparison as figures
 from dess.analysis.figures import missions as maps
-from dess.analysis.metrics import PRODUCT, SUCCESS
+from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.results.event_log import uav_slots
 from dess.analysis.results.resimulate import Mission
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import compare
-from dess.analysis.stats.intervals import summary
+from dess.analysis.stats.differences import compare, difference_test, differences_of, t_test
+from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
+    BETTER,
     INCONCLUSIVE,
     NOT_RULED_OUT,
     SEEN_ABOVE,
     SEEN_BELOW,
+    SEEN_BETTER,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
     judge_difference,
+    position_of,
+    position_with_allowance,
 )
 from dess.analysis.tables import BARS
 from dess.policies.planner import Course, Planner, first_plan
@@ -36,10 +47,10 @@ from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 
 _CLAIMS = {
-    ABOVE: "The planner is better",
-    SEEN_ABOVE: f"The planner is better in what was seen; {NOT_RULED_OUT}",
-    BELOW: "The learner is better",
-    SEEN_BELOW: f"The learner is better in what was seen; {NOT_RULED_OUT}",
+    BETTER: "The planner is better",
+    SEEN_BETTER: f"The planner is better in what was seen; {NOT_RULED_OUT}",
+    WORSE: "The learner is better",
+    SEEN_WORSE: f"The learner is better in what was seen; {NOT_RULED_OUT}",
     INCONCLUSIVE: "The missions do not tell which is better",
 }
 
@@ -76,7 +87,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
     points = numbers.format_points(overall.difference, overall.low, overall.high)
-    verdict = judge_difference(overall)
+    verdict = better_or_worse(judge_difference(overall), PRODUCT)
     sentence = (
         f"{_CLAIMS[verdict]}: the product of {planner} minus that of "
         f"{overall.baseline} is {points} points over {overall.n:,} missions."
@@ -84,7 +95,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     if verdict == INCONCLUSIVE:
         return sentence, ""
     number = f"{numbers.format_difference(overall.difference, 0)} points"
-    if verdict in (SEEN_ABOVE, SEEN_BELOW):
+    if verdict in (SEEN_BETTER, SEEN_WORSE):
         number += " in what was seen"
     return sentence, number
 
@@ -116,7 +127,7 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     """
     means = summary(results.missions, by=["policy"]).query("metric == @PRODUCT")
     seconds = {cost.policy: cost.median for cost in times.costs}
-    points = comparison.decision_time_front(means[["policy", "mean", "low", "high"]], seconds)
+    points = decision_time_front(means[["policy", "mean", "low", "high"]], seconds)
     return Drawing(
         plot_decision_times(points),
         "Decision time against the product of all policies, and their Pareto front",
@@ -126,29 +137,86 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
 
 
 def collected_shares(results: Results, policy: str) -> np.ndarray:
-    """The (K,) mean shares of their data that the nodes lose to a policy, over kept event logs."""
+    """The (n, K) shares of their data that the nodes lose to a policy, by kept event log."""
     nodes = len(results.scenario().nodes)
     data = [
         (data_by_uav_and_node(log, _count_uavs(log), nodes), data_by_node(log, nodes))
         for log in _event_logs(results, policy)
     ]
-    return np.mean([of_uavs.sum(axis=0) / of_nodes for of_uavs, of_nodes in data], axis=0)
+    return np.array([of_uavs.sum(axis=0) / of_nodes for of_uavs, of_nodes in data])
 
 
 def draw_coverage(results: Results, planner: str, learner: str) -> list[Drawing]:
-    """Maps of what two policies collect from every node, and of the difference."""
-    first, second = (collected_shares(results, policy) for policy in (planner, learner))
-    single = {f"Collected by {planner}": first, f"Collected by {learner}": second}
-    shown = single | {f"{planner} − {learner}": first - second}
-    counted = f"means over n = {len(_logged_replications(results, planner))} missions"
-    return [
-        Drawing(
-            node_map(results.scenario(), title, values, signed=title not in single),
-            title,
-            f"{title}: {counted}, in percent of the node's data.",
-        )
-        for title, values in shown.items()
-    ]
+    """Maps of what two policies collect from every node, and of the difference.
+
+    They are of few missions: so what one policy collects has pale colours, and a difference that
+    these missions do not show has none.
+    """
+    shares = {policy: collected_shares(results, policy) for policy in (planner, learner)}
+    space = results.scenario()
+    missions = len(_logged_replications(results, planner))
+    counted = f"means over n = {missions} missions, in percent of the node's data."
+    drawings = []
+    for policy, of_policy in shares.items():
+        title = f"Collected by {policy}"
+        figure = node_map(space, title, of_policy.mean(axis=0), depth=style.PALE)
+        caption = f"{title}: {counted} {_widths_in_words(of_policy)}"
+        drawings.append(Drawing(figure, title, caption))
+    title = f"{planner} − {learner}"
+    change = shares[planner].mean(axis=0) - shares[learner].mean(axis=0)
+    verdicts = judge_nodes(shares[planner], shares[learner])
+    depth = np.select([verdicts == INCONCLUSIVE, is_seen(verdicts)], [0.0, style.PALE], 1.0)
+    figure = node_map(space, title, change, signed=True, depth=depth)
+    caption = f"{title}: {counted} {_verdicts_in_words(verdicts, planner)}"
+    return [*drawings, Drawing(figure, title, caption)]
+
+
+def judge_nodes(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The verdicts on the differences of what is collected from K nodes, which hold together.
+
+    Args:
+        shares: (n, K) shares in missions of a policy.
+        others: (n, K) those of the policy that it is compared with, in the same missions.
+
+    Returns:
+        (K,) of the keys of ``MARKS``.
+    """
+    metric = replace(metric_of(RATIO), among=shares.shape[1])
+    verdicts = []
+    for ours, theirs in zip(shares.T, others.T, strict=True):
+        whole, _ = difference_test(ours, theirs, metric, LEVEL)
+        seen, _ = t_test(differences_of(ours, theirs), metric.level_of_each(LEVEL))
+        verdicts.append(position_with_allowance(position_of(whole), position_of(seen)))
+    return np.array(verdicts, object)
+
+
+def is_seen(verdicts: np.ndarray) -> np.ndarray:
+    """Which verdicts hold in what was seen alone."""
+    return np.isin(verdicts.astype(str), (SEEN_ABOVE, SEEN_BELOW))
+
+
+def _widths_in_words(shares: np.ndarray) -> str:
+    """How far the interval of a node's mean reaches, as a sentence on (n, K) shares."""
+    table = column_intervals(pd.DataFrame(shares), RATIO)
+    below = (table["mean"] - table["low"]).max()
+    above = (table["high"] - table["mean"]).max()
+    return (
+        f"The 95 % interval of a node reaches up to {100 * below:.0f} points below its mean and "
+        f"{100 * above:.0f} above it, so the colours are pale."
+    )
+
+
+def _verdicts_in_words(verdicts: np.ndarray, planner: str) -> str:
+    """From how many nodes a planner collects more and less, as a sentence on (K,) verdicts."""
+    more = np.isin(verdicts.astype(str), (ABOVE, SEEN_ABOVE)).sum()
+    less = np.isin(verdicts.astype(str), (BELOW, SEEN_BELOW)).sum()
+    text = (
+        f"These missions show that {planner} collects more from {more} and less from {less} of "
+        f"{len(verdicts)} nodes (all together with 95 %); the others have no colour."
+    )
+    if is_seen(verdicts).any():
+        text += f" Pale: in what was seen; {NOT_RULED_OUT}."
+    return text
 
 
 def node_map(
@@ -157,6 +225,7 @@ def node_map(
     values: np.ndarray,
     signed: bool = False,
     write: Callable[[float], str] = "{:.0%}".format,
+    depth: float | np.ndarray = 1.0,
 ) -> Figure:
     """A map with the nodes of a scenario in the colours of values, which are written at them.
 
@@ -166,7 +235,10 @@ def node_map(
         values: (K,) values, from 0 to 1; or, if ``signed``, differences of any size.
         signed: Whether blue means above 0 and orange below 0, in percentage points.
         write: How other values are written.
+        depth: How strong the colours are, or (K,) of each node: from 0, for values that mean
+            nothing, to 1.
     """
+    depths = np.broadcast_to(depth, len(values))
     if not signed:
         colours = ["white", style.BETTER]
     else:
@@ -176,15 +248,17 @@ def node_map(
         most = max(float(np.abs(values).max()), 0.01)
     with style.new_panels(5.4) as (figure, ax):
         maps.plot_chart(space, ax)
-        ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
+        ax.scatter(*np.transpose(space.nodes), c=values * depths, s=420, zorder=3,
+                   edgecolors=style.MUTED,
                    cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
                    vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
-        for cell, value in zip(space.nodes, values, strict=True):
+        for cell, value, strength in zip(space.nodes, values, depths, strict=True):
             if signed:
                 text = numbers.format_difference(value, 0)
             else:
                 text = write(value)
-            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
+            ink = style.INK if strength else style.MUTED
+            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4, color=ink,
                         **style.OUTLINED)  # fmt: skip
         ax.set_title(title)
     return figure

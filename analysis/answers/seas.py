@@ -15,8 +15,11 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Times, plot_decision_times
+from dess.analysis.answers.policies.decision_times import (
+    Times,
+    decision_time_front,
+    plot_decision_times,
+)
 from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
@@ -134,9 +137,7 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     Its data have a row per policy, the fastest first: ``policy``, ``mean``, ``low``, ``high``,
     ``n``, ``seconds`` (of a decision for a UAV, in batches), and ``on_front``.
     """
-    points = comparison.decision_time_front(
-        means_over_seas(results), {c.policy: c.batch for c in times.costs}
-    )
+    points = decision_time_front(means_over_seas(results), {c.policy: c.batch for c in times.costs})
     return Drawing(
         plot_decision_times(points),
         "Time of a decision against the product over all seas, and the Pareto front",

@@ -1,4 +1,4 @@
-"""An upper bound on what any policy can collect in a mission (docs/concepts/bound.md)."""
+"""An upper bound on what any policy can collect in a mission (``proof.md``)."""
 
 from dess.analysis.bound.prices import Bound as Bound
 from dess.analysis.bound.prices import check_scenario as check_scenario

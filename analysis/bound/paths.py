@@ -9,13 +9,13 @@ each pair of local prices p of the home node and r of the node remembered::
     worth <= ceilings[f, phase, x, y, memory, q] + p * a + r * b
 
 The recursion needs no rounding of the allowances, and adapting to the shadowing is allowed for
-(docs/concepts/bound.md, step 4 of the proof).
+(``proof.md``, step 4 of the proof).
 
 The state of a UAV counts its flying slots f so far. A *phase* says what is known about its
 battery: not charged yet; charged so early that it must charge again; or charged so late that its
 battery suffices for the rest of the mission. Every phase has a *deadline*, the number of flying
 slots at which its battery is empty at the latest, and a *clock*: the latest mission slot in which
-flying slot f can take place (docs/concepts/bound.md, relaxations 4 and 5).
+flying slot f can take place (``proof.md``, relaxations 4 and 5).
 """
 
 from typing import NamedTuple

@@ -3,7 +3,7 @@
 In a communication slot a UAV serves one node. If a data unit of node k is worth ``w_k >= 0``, the
 slot is worth at most ``E[max_k w_k R_k]``. The rate R_k is a convex function of the shadowing of
 node k, and so is the maximum. Therefore shadowing with a few values, whose distribution is a
-mean-preserving spread of the normal one, gives an upper bound (docs/concepts/bound.md,
+mean-preserving spread of the normal one, gives an upper bound (``proof.md``,
 inequality 5). The expectation over these few values is computed exactly.
 
 How the bound of one UAV changes with the worth of data is here too, for better prices

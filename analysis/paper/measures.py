@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers import learning, main_effects, missions
-from dess.analysis.answers.learning import Transfer, last_phase, settling_position
+from dess.analysis.answers import main_effects, missions
+from dess.analysis.answers.training.curves import last_phase, settling_position, smooth_curves
+from dess.analysis.answers.training.transfer import Transfer, compare_transfer
+from dess.analysis.answers.training.variants import LEARNED, last_rows
 from dess.analysis.metrics import RATIO, SUCCESS
 from dess.analysis.names import field_named, value_text
 from dess.analysis.paper import values
@@ -158,12 +160,12 @@ class EvidenceOfTrainings(NamedTuple):
 
     def curves(self, metric: str) -> pd.DataFrame:
         """Smoothed curves of a metric."""
-        return learning.smooth_curves(self.trainings, metric)
+        return smooth_curves(self.trainings, metric)
 
-    def transfer(self, metric: str) -> learning.Transfer:
+    def transfer(self, metric: str) -> Transfer:
         """The trainings with transfer learning, compared with those without."""
         curves = self.curves(metric)
-        return learning.compare_transfer(curves, self.using, self.without, shortest=values.CROSSING)
+        return compare_transfer(curves, self.using, self.without, shortest=values.CROSSING)
 
 
 NO_RESULTS = "no results"
@@ -479,11 +481,11 @@ def level_from(judge: Judge, evidence: EvidenceOfTrainings, metric: str) -> Find
 
 def learning_to_charge(judge: Judge, evidence: EvidenceOfTrainings, variant: str) -> Finding:
     """The share of the trainings of a variant that learn to charge."""
-    last = learning.last_rows(evidence.trainings)
+    last = last_rows(evidence.trainings)
     of_variant = last[last["variant"] == variant]
     if of_variant.empty:
         raise MissingError(f"no trainings {variant}")
-    learned = of_variant[f"final_{SUCCESS}"].to_numpy() > learning.LEARNED
+    learned = of_variant[f"final_{SUCCESS}"].to_numpy() > LEARNED
     share = _share_of(learned, "trainings that learn to charge")
     length = int(of_variant["updates"].max())
     quantities = share, Quantity.exact(length, unit="steps", name="length of the trainings")

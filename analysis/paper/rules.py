@@ -9,8 +9,8 @@ from collections.abc import Collection, Sequence
 import pandas as pd
 
 from dess.analysis.answers import main_effects
-from dess.analysis.answers.learning import Transfer
 from dess.analysis.answers.main_effects import Shape
+from dess.analysis.answers.training.transfer import Transfer
 from dess.analysis.paper.values import CROSSING
 from dess.analysis.stats import verdict
 from dess.analysis.stats.differences import difference_of_intervals

@@ -13,7 +13,7 @@ import pandas as pd
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.learning import BAND_LEVEL
+from dess.analysis.answers.training.transfer import BAND_LEVEL
 from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
 from dess.analysis.results.learners import trained_policies_by_learner
@@ -214,7 +214,7 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
     Args:
         studies: Results by the name of the study: ``table4``, ``fig4``, ``fig5``, ``sweet-spot``,
             and with ``SMALLER`` at the end, as far as they have been run.
-        trainings: Learning curves, with the columns that ``answers.learning`` reads; may be
+        trainings: Learning curves, with the columns that ``answers.training`` reads; may be
             empty.
 
     Returns:

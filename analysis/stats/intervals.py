@@ -296,9 +296,10 @@ class Moments(NamedTuple):
         """
         means = np.array([node.mean for node in nodes])
         ends = np.array([node.interval(metric)[1:] for node in nodes])
-        worst, farthest, scale = worst_and_spread(means, ends, metric)
-        chosen = nodes[farthest]
-        mean = means[worst]
+        worst, farthest, wider = worst_and_spread(means, ends, metric)
+        chosen = nodes[int(farthest)]
+        mean = float(means[worst])
+        scale = float(wider)
         return cls(
             n=chosen.n,
             total=mean * chosen.n,
@@ -645,29 +646,36 @@ def worst_node(means: np.ndarray, metric: str | Metric) -> int:
 
 def worst_and_spread(
     means: np.ndarray, ends: np.ndarray, metric: str | Metric
-) -> tuple[int, int, float]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The worst node, and how wide the interval of its mean has to be: see ``worst_of_nodes``.
 
     Args:
-        means: (K,) means of the nodes.
-        ends: (K, 2) ends of intervals that hold for all nodes together; nan if unknown.
+        means: (..., K) means of the nodes.
+        ends: (..., K, 2) ends of intervals that hold for all nodes together; nan if unknown.
         metric: The metric.
 
     Returns:
-        The worst node, the node whose interval has the worst end, and by which factor the
-        deviations of the latter give an interval of the worst mean with that end.
+        (...) the worst node, (...) the node whose interval has the worst end, and (...) by which
+        factor the deviations of the latter give an interval of the worst mean with that end.
     """
-    worst = worst_node(means, metric)
     if metric_of(metric).less_is_better:
-        ends_of_nodes = np.nan_to_num(ends[:, 1], nan=-np.inf)
-        farthest = int(np.argmax(ends_of_nodes))
+        worst = np.argmax(means, axis=-1)
+        ends_of_nodes = np.nan_to_num(ends[..., 1], nan=-np.inf)
+        farthest = np.argmax(ends_of_nodes, axis=-1)
     else:
-        ends_of_nodes = np.nan_to_num(ends[:, 0], nan=np.inf)
-        farthest = int(np.argmin(ends_of_nodes))
-    width = means[farthest] - ends_of_nodes[farthest]
-    if not np.isfinite(width) or width == 0:
-        return worst, worst, 1.0
-    return worst, farthest, float((means[worst] - ends_of_nodes[farthest]) / width)
+        worst = np.argmin(means, axis=-1)
+        ends_of_nodes = np.nan_to_num(ends[..., 0], nan=np.inf)
+        farthest = np.argmin(ends_of_nodes, axis=-1)
+    end = _of_node(ends_of_nodes, farthest)
+    width = _of_node(means, farthest) - end
+    is_known = np.isfinite(width) & (width != 0)
+    distance = np.where(is_known, _of_node(means, worst) - end, 1.0)
+    return worst, np.where(is_known, farthest, worst), distance / np.where(is_known, width, 1.0)
+
+
+def _of_node(values: np.ndarray, node: np.ndarray) -> np.ndarray:
+    """The (...) values of one node each, of (..., K) values."""
+    return np.take_along_axis(values, np.expand_dims(node, -1), axis=-1)[..., 0]
 
 
 def worst_of_nodes(by_node: np.ndarray, metric: Metric) -> np.ndarray:

@@ -168,13 +168,32 @@ def sequence_ends(sequence):
         low = s.least + range_of_values * s.first / PARTS
         high = s.least + range_of_values * s.last / PARTS
         return low, high
+    return _asymptotic_ends(s, s.failure)
+
+
+@kernel
+def ends_of_what_was_seen(sequence):
+    """The ends of the interval that allows for no failure but those among the values.
+
+    It is the asymptotic sequence, also of values with bounds: what Student's interval is for a
+    fixed number of values.
+
+    Args:
+        sequence: (1,) ``SEQUENCE``.
+    """
+    return _asymptotic_ends(sequence[0], 0.0)
+
+
+@kernel
+def _asymptotic_ends(s, failure):
+    """The ends of the asymptotic interval, with one failure upwards and one downwards more."""
     if s.values < _ENOUGH:
         return s.least, s.most
     # The square of rho of the theorem, with which it is about narrowest at that number of values.
     surprise = -2.0 * log(s.error)
     rho_squared = (surprise + log(surprise) + 1.0) / _NARROWEST_AT
     growth = s.values * rho_squared + 1.0
-    variance = (s.squares + 2.0 * s.failure * s.failure) / (s.values - 1)
+    variance = (s.squares + 2.0 * failure * failure) / (s.values - 1)
     factor = 2.0 * growth / (s.values * s.values * rho_squared)
     half = math.sqrt(variance * factor * log(math.sqrt(growth) / s.error))
     return max(s.least, s.mean - half), min(s.most, s.mean + half)

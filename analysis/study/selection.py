@@ -42,7 +42,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dess import InputError
-from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
+from dess.analysis.metrics import NODES_BEHIND, PRODUCT, SUCCESS, metric_of
 from dess.analysis.study.stopping import MOST, MetricName, Samples, StrictTable, values_in
 from dess.physics.section import Integer, Number
 
@@ -154,6 +154,12 @@ class Selection(StrictTable):
 
     @model_validator(mode="after")
     def _fits_the_procedure(self) -> Self:
+        if self.metric in NODES_BEHIND:
+            raise InputError(
+                "metric",
+                f"{self.metric} is of the node that is worst over all missions, not of a mission",
+                "a metric of every mission, or procedure cheapest that requires it",
+            )
         if self.procedure == "kn-bounded" and not metric_of(self.metric).is_bounded:
             raise InputError("metric", f"{self.metric} is not bounded", "procedure kn with it")
         if self.procedure == "kn" and self.metric in (SUCCESS, PRODUCT):

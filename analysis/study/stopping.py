@@ -24,15 +24,16 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.stats.intervals import (
+    LEVEL,
     ends_of_means,
     share_half_width,
     skewness_of,
+    worst_and_spread,
 )
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
-# The values of the worst node have no part in a rule: which node that is may change.
-_METRICS = [*ALWAYS, *(metric for metric in MEASURES if metric not in NODES_BEHIND)]
+_METRICS = [*ALWAYS, *MEASURES]
 
 # For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
 Samples = Sequence[Mapping[str, np.ndarray]]
@@ -150,8 +151,9 @@ class Precision(StrictTable):
 
     The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
     Wilson's interval for ``success``, and those of ``stats.intervals.ends_of_means`` for the
-    others. They are not post-stratified by the number of UAVs, so where it is drawn, the printed
-    intervals are narrower. The *stopping point* is the first n >= ``first`` at which all targets
+    others; that of the worst node holds whichever node it is (``worst_of_nodes``). They are not
+    post-stratified by the number of UAVs, so where it is drawn, the printed intervals are narrower.
+    The *stopping point* is the first n >= ``first`` at which all targets
     are met with n, n + 1, ..., n + ``look_ahead`` missions.
     Without the look-ahead, a sample whose interval is narrow by chance would stop too
     early. The cell keeps the missions of the look-ahead.
@@ -283,7 +285,11 @@ def _running_interval_in(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The ``running_interval`` of a metric of missions, with the range that it has in them."""
     values = values_in(sample, metric)
-    return running_interval(metric_in_missions(sample, metric), values)
+    measure = metric_in_missions(sample, metric)
+    nodes = NODES_BEHIND.get(metric, "")
+    if nodes in sample:
+        return running_interval_of_worst(measure, np.stack([*sample[nodes]]))
+    return running_interval(measure, values)
 
 
 def running_interval(metric: str | Metric, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -308,6 +314,43 @@ def running_interval(metric: str | Metric, values: np.ndarray) -> tuple[np.ndarr
     if measure.is_outcome:
         successes = np.cumsum(sample)
         return successes / counts, share_half_width(successes, counts)
+    means, variances, skewness = _running_moments(sample)
+    ends = ends_of_means(measure, means, variances, skewness, counts)
+    return means, _half_widths(measure, ends)
+
+
+def running_interval_of_worst(metric: Metric, by_node: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The ``running_interval`` of the worst node, whose interval is that of ``worst_of_nodes``.
+
+    Which node is the worst may change from one mission to the next. The interval holds whichever it
+    is, so its length may be waited for like that of any other mean.
+
+    Args:
+        metric: The metric, of K nodes.
+        by_node: (n, K) values.
+
+    Returns:
+        (n,) means and (n,) half-widths.
+    """
+    counts = np.arange(1, len(by_node) + 1)
+    level = metric.level_of_each(LEVEL)
+    of_nodes = [_running_moments(values) for values in by_node.T]
+    means, variances, skewness = (
+        np.stack(moment, axis=-1) for moment in zip(*of_nodes, strict=True)
+    )
+    ends = ends_of_means(metric, means, variances, skewness, counts[:, None], level)
+    worst, farthest, scale = worst_and_spread(means, np.stack(ends, axis=-1), metric)
+    rows = counts - 1
+    means_of_worst = means[rows, worst]
+    spread = variances[rows, farthest] * scale**2
+    skew = np.where(spread > 0, skewness[rows, farthest], 0.0)
+    ends = ends_of_means(metric, means_of_worst, spread, skew, counts, level)
+    return means_of_worst, _half_widths(metric, ends)
+
+
+def _running_moments(sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means, mean squared deviations and skewness of the first 1..n values."""
+    counts = np.arange(1, len(sample) + 1)
     # The values are shifted by the first one, so that equal values give a width of exactly 0.
     shifted = sample - sample[:1]
     means = np.cumsum(shifted) / counts
@@ -315,9 +358,13 @@ def running_interval(metric: str | Metric, values: np.ndarray) -> tuple[np.ndarr
     squares = np.cumsum((counts - 1) / counts * (shifted - before) ** 2)  # Welford
     sums = np.cumsum(shifted**3) - 3 * means * np.cumsum(shifted**2)
     skewness = skewness_of(squares, sums + 2 * counts * means**3, counts)
-    means = sample[:1] + means
-    low, high = ends_of_means(measure, means, squares / counts, skewness, counts)
+    return sample[:1] + means, squares / counts, skewness
+
+
+def _half_widths(metric: Metric, ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Half the lengths of intervals of the first 1..n values; a single one may have none."""
+    low, high = ends
     widths = (high - low) / 2
-    if not measure.is_bounded:
+    if not metric.is_bounded:
         widths[:1] = np.inf
-    return means, widths
+    return widths

@@ -14,7 +14,13 @@ from numba import carray, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from dess.analysis.stats.sequences import SEQUENCE, add_values, sequence_ends, start_sequence
+from dess.analysis.stats.sequences import (
+    SEQUENCE,
+    add_values,
+    ends_of_what_was_seen,
+    sequence_ends,
+    start_sequence,
+)
 from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import BATCH, World
@@ -102,7 +108,8 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     # these are not known, and the error of the ends.
     "bounds": (_F8, 2),
     "sequences": (SEQUENCE, 1),  # (METRICS,) the confidence sequences of the means
-    "ends": (_F8, 2),  # (METRICS, 2) the ends of the intervals of the means
+    # (METRICS, 4) the ends of the intervals of the means, then those of what was seen.
+    "ends": (_F8, 2),
 }
 WORDS = 5  # of the table for each array
 _AT = namedtuple("_At", ARRAYS)(*range(0, WORDS * len(ARRAYS), WORDS))
@@ -491,6 +498,7 @@ def add(table, count):
         sequence = sequences[column : column + 1]
         add_values(sequence, values[:count, column])
         ends[column, 0], ends[column, 1] = sequence_ends(sequence)
+        ends[column, 2], ends[column, 3] = ends_of_what_was_seen(sequence)
     for row in range(count):
         for column in range(values.shape[1]):
             value = values[row, column]

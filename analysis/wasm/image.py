@@ -264,7 +264,7 @@ def _arrays_of(
         "totals": np.zeros((len(METRICS), len(TOTALS))),
         "bounds": _bounds_of(space, fleet),
         "sequences": np.zeros(len(METRICS), SEQUENCE),
-        "ends": np.zeros((len(METRICS), 2)),
+        "ends": np.zeros((len(METRICS), 4)),
     }
     return {
         name: _without_content(arrays[name]) if name in SHAPES else _without_gaps(arrays[name])

@@ -22,25 +22,55 @@ heuristic = None  # the policy to compare it with; None for the best that is not
 from IPython.display import display
 
 from dess.analysis import load_results, tables
-from dess.analysis.answers import comparison as answers
 from dess.analysis.answers import missions as logged
 from dess.analysis.answers import summary
-from dess.reports.pages import html
+from dess.analysis.answers.policies.decision_times import (
+    decision_time_sentences,
+    read_decision_times,
+    time_table,
+)
+from dess.analysis.answers.policies.pairs import (
+    compare_pair,
+    count_depleted_uavs,
+    draw_difference_distribution,
+    mission_commands,
+    missions_to_draw,
+    most_lost,
+    outcome_table,
+    pair_missions,
+    pair_of,
+    pair_outcome_table,
+    pair_sentence,
+    pairing_sentence,
+    worst_pair_missions,
+)
+from dess.analysis.answers.policies.parameter_bins import (
+    LEAST,
+    colours_in_words,
+    dependence_on_parameters,
+    dependence_table,
+    differences_along_parameters,
+    draw_differences_along_parameters,
+)
+from dess.reports.pages.markdown import command_block, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/comparison")
-times = answers.read_decision_times(results, study)
-pair = answers.pair_of(study, learned, heuristic)
-missions = answers.pair_missions(study, pair)
-comparison = answers.compare_pair(study, pair)
-worst = answers.worst_pair_missions(missions, 5)
-lost = answers.most_lost(missions.drop(worst.index), 5)
+times = read_decision_times(results, study)
+pair = pair_of(study, learned, heuristic)
+missions = pair_missions(study, pair)
+comparison = compare_pair(study, pair)
+worst = worst_pair_missions(missions, 5)
+lost = most_lost(missions.drop(worst.index), 5)
 
 # %%
-html.make_answer(answers.pair_sentence(comparison, missions, pair))
+make_answer(pair_sentence(comparison, missions, pair))
 
 # %%
-html.lead_figure(*answers.draw_difference_distribution(missions, pair))
+lead_figure(*draw_difference_distribution(missions, pair))
 
 # %% [markdown]
 # ## Why: where it is better
@@ -48,17 +78,13 @@ html.lead_figure(*answers.draw_difference_distribution(missions, pair))
 # Each parameter is divided into at most five bins with about equally many missions.
 
 # %%
-lead = answers.differences_along_parameters(missions, pair.candidates)
-html.write_markdown("{colours}", colours=answers.colours_in_words(lead, pair))
+lead = differences_along_parameters(missions, pair.candidates)
+write_markdown("{colours}", colours=colours_in_words(lead, pair))
 
 # %%
-too_few = html.write_markdown(
-    "Too few missions for bins of n = {least} or more.", least=answers.LEAST
-)
-html.show_parts(
-    answers.draw_differences_along_parameters(
-        missions, lead, pair, f"{pair.title}, 95 % intervals, "
-    )
+too_few = write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
+show_parts(
+    draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, 95 % intervals, ")
     or too_few
 )
 
@@ -68,8 +94,8 @@ html.show_parts(
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-kept = logged.kept_missions(study, answers.missions_to_draw(missions, pair), results)
-html.make_gallery(
+kept = logged.kept_missions(study, missions_to_draw(missions, pair), results)
+make_gallery(
     logged.draw_mission(
         mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption
     )
@@ -85,7 +111,7 @@ html.make_gallery(
 
 # %%
 found = {
-    answers.pairing_sentence(comparison): comparison,
+    pairing_sentence(comparison): comparison,
     "every learner and the best heuristic": summary.compare_learned_with_heuristic(study),
     "every policy and the best one": summary.compare_with_best(study),
 }
@@ -93,8 +119,8 @@ for caption, rows in found.items():
     if len(rows):
         shown = tables.comparison_cells(rows, rows.columns[0])
         of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
-        display(html.make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
-html.write_markdown(
+        display(make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
+write_markdown(
     "{correction} {why} {weights}",
     correction=summary.correction_in_words(study),
     why=summary.allowance_for_difference(comparison, "policy"),
@@ -105,38 +131,38 @@ html.write_markdown(
 # ## Tables
 
 # %%
-depleted = answers.count_depleted_uavs(study, pair.policy, worst["replication"])
-html.make_table(answers.pair_outcome_table(missions, pair), "Outcomes of the missions")
+depleted = count_depleted_uavs(study, pair.policy, worst["replication"])
+make_table(pair_outcome_table(missions, pair), "Outcomes of the missions")
 
 # %%
-html.make_table(
-    answers.dependence_table(lead, answers.dependence_on_parameters(missions)),
+make_table(
+    dependence_table(lead, dependence_on_parameters(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
 
 # %%
-html.make_table(
-    answers.outcome_table(worst, study, pair),
+make_table(
+    outcome_table(worst, study, pair),
     f"The worst missions of {pair.policy}; {depleted} of its UAVs run out of battery in these",
 )
 
 # %%
-html.make_table(answers.outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
+make_table(outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
 
 # %%
-html.make_table(answers.time_table(times), "Time of a decision for the UAVs of a mission")
+make_table(time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-lines = answers.mission_commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
-html.write_markdown(
+lines = mission_commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
+write_markdown(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
-    times=answers.decision_time_sentences(times, study, pair),
-    lines=html.command_block(lines),
+    times=decision_time_sentences(times, study, pair),
+    lines=command_block(lines),
 )
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

@@ -20,24 +20,51 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 from pathlib import Path
 
 from dess.analysis import numbers
-from dess.analysis.answers import learning as answers
+from dess.analysis.answers.training.curves import BASELINE, SHOWN, TRAININGS, pairs_in, read_curves
+from dess.analysis.answers.training.trained import (
+    course_in_words,
+    shipped_drawings,
+    trained_policies,
+    training_commands,
+)
+from dess.analysis.answers.training.transfer import (
+    compare_all_transfers,
+    transfer_drawings,
+    transfer_table,
+)
+from dess.analysis.answers.training.variants import (
+    FINAL,
+    ablation_table,
+    compare_variants,
+    draw_method_ladder,
+    draw_variants,
+    last_rows,
+    learning_to_charge,
+    methods_sentence,
+    of_equal_budget,
+    rows_of_ladder,
+    without_each,
+)
 from dess.analysis.paper import measures, scorecard, values
 from dess.policies.registry import TRAINED
-from dess.reports.pages import html
+from dess.reports.pages.markdown import command_block, escape_sentences, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_figure, make_gallery
+from dess.reports.pages.provenance import weights_table
+from dess.reports.pages.tables import make_table
 
 # %%
 folder = Path(str(trained or TRAINED))
-trainings = answers.read_curves(folder / "curves.parquet")
-last = answers.last_rows(trainings)
-baseline = answers.BASELINE
-rungs = answers.rows_of_ladder(last)
-equal = answers.of_equal_budget(last, baseline)
+trainings = read_curves(folder / "curves.parquet")
+last = last_rows(trainings)
+baseline = BASELINE
+rungs = rows_of_ladder(last)
+equal = of_equal_budget(last, baseline)
 
 # %%
-html.make_answer(answers.methods_sentence(rungs))
+make_answer(methods_sentence(rungs))
 
 # %%
-html.lead_figure(*answers.draw_method_ladder(rungs))
+lead_figure(*draw_method_ladder(rungs))
 
 # %% [markdown]
 # ## Why: the effect of each method
@@ -49,10 +76,8 @@ html.lead_figure(*answers.draw_method_ladder(rungs))
 # is the paper's network.
 
 # %%
-table = answers.compare_variants(equal, baseline)
-html.make_figure(
-    *answers.draw_variants(table, equal, baseline, "The product that every variant reaches")
-)
+table = compare_variants(equal, baseline)
+make_figure(*draw_variants(table, equal, baseline, "The product that every variant reaches"))
 
 # %% [markdown]
 # What a method adds depends on the methods that are there before it.
@@ -62,7 +87,7 @@ html.make_figure(
 # our methods.
 
 # %%
-html.write_markdown("{text}", text=answers.without_each(last))
+write_markdown("{text}", text=without_each(last))
 
 # %% [markdown]
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
@@ -72,23 +97,23 @@ html.write_markdown("{text}", text=answers.without_each(last))
 
 # %%
 lines = [
-    f"- {name}: {answers.learning_to_charge(last, using)} with transfer, "
-    f"{answers.learning_to_charge(last, without)} without"
-    for name, (using, without) in answers.pairs_in(trainings).items()
+    f"- {name}: {learning_to_charge(last, using)} with transfer, "
+    f"{learning_to_charge(last, without)} without"
+    for name, (using, without) in pairs_in(trainings).items()
 ]
-html.write_markdown(
-    "Trainings that learn to charge:\n\n{lines}", lines=html.escape_sentences("\n".join(lines))
+write_markdown(
+    "Trainings that learn to charge:\n\n{lines}", lines=escape_sentences("\n".join(lines))
 )
 
 # %%
-html.make_gallery(answers.transfer_drawings(trainings), answers.TRAININGS)
+make_gallery(transfer_drawings(trainings), TRAININGS)
 
 # %% [markdown]
 # ## The shipped policies
 
 # %%
-shipped = answers.trained_policies(folder)
-html.make_gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
+shipped = trained_policies(folder)
+make_gallery(shipped_drawings(shipped), TRAININGS)
 
 # %% [markdown]
 # ## How far to trust it
@@ -99,14 +124,14 @@ html.make_gallery(answers.shipped_drawings(shipped), answers.TRAININGS)
 # UAVs the same weight, so their mean of the same policy may differ by about a point.
 
 # %%
-transfers = answers.compare_all_transfers(trainings, answers.SHOWN, shortest=values.CROSSING)
-rules = dict(zip(answers.SHOWN, ("throughout", "passes"), strict=True))
+transfers = compare_all_transfers(trainings, SHOWN, shortest=values.CROSSING)
+rules = dict(zip(SHOWN, ("throughout", "passes"), strict=True))
 verdicts = {key: scorecard.RULES[rules[key[1]]].judge(t) for key, t in transfers.items()}
-best = last.groupby("variant")[answers.FINAL].max().map(numbers.format_percent)
-pair, variants = [*answers.pairs_in(trainings).items()][-1]
+best = last.groupby("variant")[FINAL].max().map(numbers.format_percent)
+pair, variants = [*pairs_in(trainings).items()][-1]
 
 # %%
-html.write_markdown(
+write_markdown(
     "The longest of these pairs have {steps:,} steps; in the paper the curves cross at {paper:,}, "
     "and shorter trainings are inconclusive. With {name}, the best training with transfer reaches "
     "a product of {ends[0]}, the best without {ends[1]}.",
@@ -120,8 +145,8 @@ html.write_markdown(
 # ## Tables
 
 # %%
-html.make_table(
-    answers.ablation_table(table, equal, baseline),
+make_table(
+    ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
     "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive, by the "
     "interval, which is not corrected for the number of variants",
@@ -129,8 +154,8 @@ html.make_table(
 )
 
 # %%
-compared = answers.transfer_table(transfers, verdicts)
-html.make_table(
+compared = transfer_table(transfers, verdicts)
+make_table(
     compared,
     "With transfer against without: the last difference with its 99 % interval (of the product "
     "in points)",
@@ -141,10 +166,10 @@ html.make_table(
 # ## How this page was made
 
 # %%
-html.write_markdown(
+write_markdown(
     "Where the moving average of the product ends, and from when on it is near:\n\n{courses}",
-    courses=html.escape_sentences(
-        "\n".join(answers.course_in_words(policy, measures.MARGIN) for policy in shipped)
+    courses=escape_sentences(
+        "\n".join(course_in_words(policy, measures.MARGIN) for policy in shipped)
     ),
 )
 
@@ -153,9 +178,7 @@ html.write_markdown(
 
 # %%
 again = "python -m benchmarks.learning_curves --out runs/learning"
-html.write_markdown(
-    "{lines}", lines=html.command_block([again, *answers.training_commands(shipped)])
-)
+write_markdown("{lines}", lines=command_block([again, *training_commands(shipped)]))
 
 # %%
-html.weights_table(folder)
+weights_table(folder)

@@ -162,8 +162,9 @@ def simulate_missing(
     """
     if not {COMPARISON, *TIMED} & {*pages}:
         return  # what follows takes its time to import
-    from dess.analysis.answers import comparison
     from dess.analysis.answers.missions import keep_logs
+    from dess.analysis.answers.policies.decision_times import ensure_decision_times
+    from dess.analysis.answers.policies.pairs import missions_to_draw, pair_missions, pair_of
 
     def show(done: int, total: int) -> None:
         if progress:
@@ -171,8 +172,8 @@ def simulate_missing(
 
     if COMPARISON in pages:
         study = load_results(results / COMPARISON)
-        pair = comparison.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
-        drawn = comparison.missions_to_draw(comparison.pair_missions(study, pair), pair)
+        pair = pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
+        drawn = missions_to_draw(pair_missions(study, pair), pair)
         keep_logs(study, drawn, results, show)
     for page in TIMED.keys() & {*pages}:
-        comparison.ensure_decision_times(results, load_results(results / TIMED[page]), show)
+        ensure_decision_times(results, load_results(results / TIMED[page]), show)

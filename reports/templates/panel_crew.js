@@ -38,6 +38,7 @@ const SUMMED = ["values", "baseline", "totals", "sequences", "ends"]; // what a 
 // Numbers of a metric in the array of that name: the least and the largest value, by how much a
 // failure changes a value, and the error.
 const BOUNDS = 4, FAILURE = 2;
+const ENDS = 4; // of a metric: those of its interval, then those of what was seen
 const rowsOf = (/** @type {Image} */ image, /** @type {string} */ name) =>
     image.arrays.find((array) => array.name === name)?.shape[0] ?? 0;
 
@@ -108,7 +109,8 @@ class Series {
         const [totals, ends] = [this.engine.floats("totals"), this.engine.floats("ends")];
         const width = totals.length / this.image.metrics.length;
         const [count, sum] = totals.slice(column * width);
-        return {mean: sum / count, low: ends[2 * column], high: ends[2 * column + 1], count};
+        const [low, high, lowSeen, highSeen] = ends.slice(ENDS * column);
+        return {mean: sum / count, low, high, lowSeen, highSeen, count};
     }
 }
 

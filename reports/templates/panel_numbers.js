@@ -10,6 +10,7 @@
  * @property {string} unit
  * @property {boolean} less - whether less is better
  * @property {boolean} neutral - whether neither more nor less is better
+ * @property {boolean} isOutcome - whether it is 0 or 1 in each mission: what allows for failures is then exact
  * @property {boolean} isOffered - whether a reader may require it
  * @property {number} tolerance - how far from a bound either verdict of the grid is right
  * @property {string} suffix - of an amount on the command line
@@ -17,8 +18,8 @@
  */
 
 /**
- * A mean and the ends of its interval.
- * @typedef { {mean: number, low: number, high: number, count: number}} Estimate
+ * A mean, the ends of its interval, and the ends of the one that allows for no failure but those that were seen.
+ * @typedef { {mean: number, low: number, high: number, lowSeen: number, highSeen: number, count: number}} Estimate
  */
 
 /**
@@ -83,23 +84,46 @@ function signed({percent}, number) {
     return number > 0 && Number(text) !== 0 ? `+${text}` : text;
 }
 
+// As the pages say it of a study (dess.analysis.stats.verdict).
+const SEEN = "in what was seen", NOT_RULED_OUT = "a rare failure is not ruled out";
+
 /**
- * Whether B is higher or lower, and better if that can be said, or about how many more missions may decide it.
+ * Whether B is higher or lower, and better if that can be said, or about how many more missions may decide it. Where the
+ * interval contains 0 only because it allows for failures that were not seen, it is so in what was seen.
  * @type {(metric: Metric, estimate: Estimate) => string}
  */
-function decision(metric, {mean, low, high, count}) {
-    if (low > 0 || high < 0) {
-        const side = `decided: B is ${low > 0 ? "higher" : "lower"}`;
-        if (metric.neutral) return side;
-        const isBetter = metric.less ? high < 0 : low > 0;
-        return `${side}, which is ${isBetter ? "better" : "worse"}`;
-    }
+function decision(metric, estimate) {
+    const {mean, low, high, lowSeen, highSeen} = estimate;
+    const side = sideOf(metric, low, high);
+    if (side) return `decided: B is ${side}`;
     if (!Number.isFinite(high - low)) return "not decided";
     if (low === high) return "no difference seen";
     if (!mean) return `no difference seen; at most ${signed(metric, high).slice(1)} ${unitOfDifference(metric)}`.trim();
-    // An interval becomes narrower with about the root of the number of missions.
+    const sideSeen = metric.isOutcome ? "" : sideOf(metric, lowSeen, highSeen);
+    const more = moreMissions(estimate);
+    if (sideSeen) return `${SEEN}, B is ${sideSeen}; ${NOT_RULED_OUT}${more}`;
+    return `not decided${more}`;
+}
+
+/**
+ * On which side of 0 a whole interval is, and whether that is better if it can be said; nothing if it contains 0.
+ * @type {(metric: Metric, low: number, high: number) => string}
+ */
+function sideOf(metric, low, high) {
+    if (!(low > 0 || high < 0)) return "";
+    const side = low > 0 ? "higher" : "lower";
+    if (metric.neutral) return side;
+    const isBetter = metric.less ? high < 0 : low > 0;
+    return `${side}, which is ${isBetter ? "better" : "worse"}`;
+}
+
+/**
+ * About how many more missions may decide a difference: an interval becomes narrower with about the root of their number.
+ * @type {(estimate: Estimate) => string}
+ */
+function moreMissions({mean, low, high, count}) {
     const needed = count * ((high - low) / 2 / Math.abs(mean)) ** 2 - count;
-    return `not decided${needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more missions` : ""}`;
+    return needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more missions` : "";
 }
 
 /** @type {(requirement: Requirement) => string} */
@@ -115,14 +139,18 @@ function requirementInWords({metric, bound}) {
 const roomOf = ({metric, bound}, number) => metric.less ? bound - number : number - bound;
 
 /**
- * Whether a whole interval keeps a bound (*meets*), breaks it (*misses*), or neither (*open*). Within
- * the tolerance of the bound, either verdict is right: the mean decides where both are known.
- * @type {(requirement: Requirement, estimate: Estimate, tolerance?: number) => "meets" | "misses" | "open"}
+ * The verdicts by what is known of a bound, as ``stats/verdict.py`` has them.
+ * @typedef { {mostSeriousFirst: string[], table: (string | null)[][]}} Rule
  */
-function verdict(requirement, {mean, low, high, count}, tolerance = 0) {
-    if (!count) return "open";
-    const rooms = [low, high].map((end) => roomOf(requirement, end));
-    const isMet = Math.min(...rooms) >= -tolerance, isMissed = Math.max(...rooms) < tolerance;
-    if (isMet && isMissed) return roomOf(requirement, mean) >= 0 ? "meets" : "misses";
-    return isMet ? "meets" : isMissed ? "misses" : "open";
+
+/**
+ * Whether a whole interval keeps a bound, breaks it, or neither. Both are known only within the
+ * tolerance of the bound: there the mean decides.
+ * @type {(rule: Rule, requirement: Requirement, estimate: Estimate, tolerance?: number) => string}
+ */
+function verdict({table}, requirement, {mean, low, high, count}, tolerance = 0) {
+    const rooms = count ? [low, high].map((end) => roomOf(requirement, end)) : [NaN];
+    const isKept = Math.min(...rooms) >= -tolerance, isBroken = Math.max(...rooms) < tolerance;
+    const isMeanGood = roomOf(requirement, mean) >= 0;
+    return table[Number(isKept)][Number(isBroken)] ?? table[Number(isMeanGood)][Number(!isMeanGood)];
 }

@@ -1,4 +1,4 @@
-"""The ten data sheets of the docs, computed a second time by formulas that are written anew here.
+"""Ten data sheets (``ten-sheets.md``), computed a second time by formulas of this module.
 
 ``DESS_WRITE_PINS=1`` writes the table of the page.
 """
@@ -17,7 +17,7 @@ from dess.analysis.sheet import sheet_facts
 from dess.scenario.data_sheet import DataSheet
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = DOCS / "reference/ten-sheets.md"
+PAGE = Path(__file__).with_name("ten-sheets.md")
 SEA, *SHEETS = re.findall(r"^```toml\n(.*?)^```", PAGE.read_text("utf-8"), re.M | re.S)
 NAMES = re.findall(r"^## (\d+\. .*)$", PAGE.read_text("utf-8"), re.M)
 

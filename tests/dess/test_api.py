@@ -1,7 +1,4 @@
-"""The functions of ``import dess`` take names, and former names of modules can be imported."""
-
-import sys
-from importlib import import_module
+"""The functions of ``import dess`` take names."""
 
 import pytest
 
@@ -25,26 +22,3 @@ def test_a_name_stands_for_the_policies_that_it_loads(team):
 def test_the_model_takes_no_names():
     with pytest.raises(dess.InputError, match="policy: 'greedy' is of type str"):
         mission.simulate(dess.load_scenario("paper"), "greedy")
-
-
-@pytest.mark.parametrize(
-    ("former", "now", "name"),
-    [
-        ("dess.env.stepper", "dess.envs.stepper", "REWARD_TERMS"),
-        ("dess.guard", "dess.model.guard", "guard"),
-        ("dess.integrations", "dess.envs.integrations", "__doc__"),
-        (
-            "dess.observations.components",
-            "dess.envs.observations.components",
-            "component_names",
-        ),
-    ],
-)
-def test_former_names_warn_and_give_what_the_new_names_give(monkeypatch, former, now, name):
-    package = ".".join(former.split(".")[:2])
-    for module in [m for m in sys.modules if m == package or m.startswith(f"{package}.")]:
-        monkeypatch.delitem(sys.modules, module)
-    with pytest.warns(DeprecationWarning, match=f"{package} has become dess"):
-        import_module(former)
-    assert hasattr(sys.modules[former], name)
-    assert sys.modules[former].__file__ == import_module(now).__file__

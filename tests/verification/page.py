@@ -1,4 +1,4 @@
-"""The page of the docs that has what the checks measured."""
+"""The kept page that has what the checks measured."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from dess.analysis.stats.verdict import HOLDS
 from tests.verification.checks import ALPHA, reason_in_words
 from tests.verification.suite import Suite
 
-DOCS = Path(__file__).parents[2] / "docs" / "concepts"
+KEPT = Path(__file__).with_name("kept")
 # The text of the page, with a place for each part that is measured.
 TEXT = Path(__file__).with_name("page.md")
 

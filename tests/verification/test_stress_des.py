@@ -12,7 +12,7 @@ from dess.scenario.fields import GEOMETRY, LANDING, SECTIONS
 from dess.scenario.scenario import Scenario
 from tests.pins.pinned import check_kept
 from tests.verification import stress_des
-from tests.verification.page import DOCS
+from tests.verification.page import KEPT
 from tests.verification.suite import STUDY
 
 # Another value of every field of the paper's scenario.
@@ -91,4 +91,4 @@ def test_no_number_of_the_model_is_typed():
 def test_the_page_of_the_docs_describes_the_shipped_studies():
     """``DESS_WRITE_PINS=1`` writes it."""
     others = [Manifest.of(load_study(name)).data for name in study_names() if name != STUDY]
-    check_kept(DOCS / "stress-des.md", stress_des.render_model(manifest(), others))
+    check_kept(KEPT / "stress-des.md", stress_des.render_model(manifest(), others))

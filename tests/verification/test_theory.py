@@ -1,4 +1,4 @@
-"""The simulator agrees with exact theory, and the page of the docs has what was measured."""
+"""The simulator agrees with exact theory, and the kept page has what was measured."""
 
 import re
 from pathlib import Path
@@ -10,10 +10,10 @@ from dess.analysis import load_study, run_study
 from dess.analysis.stats.verdict import HOLDS, REFUTED
 from tests.pins.pinned import check_kept
 from tests.verification.checks import TOPICS, judge_checks
-from tests.verification.page import DOCS, render_page, studies_by_name
+from tests.verification.page import KEPT, render_page, studies_by_name
 from tests.verification.suite import STUDY, Suite
 
-KEPT = DOCS / "verification.md"
+PAGE = KEPT / "checks.md"
 BLOCK = 100  # missions
 # Studies beside it, whose missions keep their data: with failures, ages, queues and many UAVs.
 OTHERS = ("failures", "age", "pads", "fig4")
@@ -58,7 +58,7 @@ def test_the_simulator_agrees_with_theory(judged, topic):
 
 @pytest.mark.slow
 def test_the_page_has_what_was_measured(suite, judged):
-    check_kept(KEPT, render_page(suite, judged, BLOCK))
+    check_kept(PAGE, render_page(suite, judged, BLOCK))
 
 
 @pytest.fixture(scope="module")
@@ -83,4 +83,4 @@ def test_the_kept_page_is_that_of_these_checks(few):
     judged = judge_checks(few.checks(20))
     assert REFUTED not in set(judged["verdict"])
     page = render_page(few, judged, 20)
-    assert frame_of(page) == frame_of(KEPT.read_text("utf-8"))
+    assert frame_of(page) == frame_of(PAGE.read_text("utf-8"))

@@ -9,7 +9,9 @@ from dess.analysis import run_study
 from dess.analysis.answers import planner
 from dess.analysis.bound import Bound
 from dess.analysis.execution import jobs
+from dess.analysis.figures import style
 from dess.analysis.results.event_log import uav_slots
+from dess.analysis.stats.verdict import ABOVE, INCONCLUSIVE, SEEN_ABOVE
 from dess.policies.planner import Budget, Planner
 from tests.analysis.small import small_study
 
@@ -50,8 +52,39 @@ def test_coverage_is_what_the_logs_say_was_collected(results):
         had = by_node["mission_start"].add(by_node.get("arrival", 0.0), fill_value=0.0)
         shares.append(by_node["communication"].reindex(range(3), fill_value=0.0) / had)
     expected = np.mean(shares, axis=0)
-    np.testing.assert_allclose(planner.collected_shares(results, "greedy"), expected)
+    found = planner.collected_shares(results, "greedy")
+    np.testing.assert_allclose(found.mean(axis=0), expected)
     assert 0 < expected.min() <= expected.max() <= 1
+
+
+def test_few_missions_show_few_differences_of_nodes():
+    """At the first node by far, at the second one in what was seen, at the last ones not at all."""
+    noise = np.random.default_rng(3).normal(0, 0.02, (60, 4))
+    others = np.full((60, 4), 0.3)
+    shares = others + [0.5, 0.02, 0.0, 0.0] + noise
+    verdicts = planner.judge_nodes(shares, others)
+    assert verdicts.tolist() == [ABOVE, SEEN_ABOVE, INCONCLUSIVE, INCONCLUSIVE]
+    assert ABOVE not in planner.judge_nodes(shares[:10], others[:10])[1:]
+
+
+def test_maps_of_few_missions_have_pale_colours_or_none(results):
+    ours, theirs, change = planner.draw_coverage(results, "greedy", "random")
+    shares = [planner.collected_shares(results, policy) for policy in ("greedy", "random")]
+    for drawing, of_policy in zip((ours, theirs), shares, strict=True):
+        (nodes,) = (
+            part for part in drawing.figure.axes[0].collections if part.get_array() is not None
+        )
+        np.testing.assert_allclose(nodes.get_array(), style.PALE * of_policy.mean(axis=0))
+        assert "The 95 % interval of a node reaches up to" in drawing.caption
+    verdicts = planner.judge_nodes(*shares)
+    assert SEEN_ABOVE in verdicts and INCONCLUSIVE in verdicts
+    (nodes,) = (part for part in change.figure.axes[0].collections if part.get_array() is not None)
+    depth = [{SEEN_ABOVE: style.PALE, INCONCLUSIVE: 0.0}[verdict] for verdict in verdicts]
+    expected = depth * (shares[0] - shares[1]).mean(axis=0)
+    np.testing.assert_allclose(nodes.get_array(), expected)
+    more = list(verdicts).count(SEEN_ABOVE)
+    assert f"greedy collects more from {more} and less from 0 of 3 nodes" in change.caption
+    assert "Pale: in what was seen; a rare failure is not ruled out." in change.caption
 
 
 def test_the_share_at_home_is_that_of_uavs_in_the_zone(results):

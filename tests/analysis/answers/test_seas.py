@@ -8,7 +8,7 @@ import pytest
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.answers import seas
-from dess.analysis.answers.comparison import Cost, Times
+from dess.analysis.answers.policies.decision_times import Cost, Times
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import share_interval

@@ -2,7 +2,7 @@
 
 UAVs move, charge and end by the rules of the simulator. The shadowing has a few values here, each
 of them the mean of the normal distribution over a part of the line. That is a mean-preserving
-contraction of the normal distribution, so inequality 5 of docs/concepts/bound.md holds for it, and
+contraction of the normal distribution, so inequality 5 of analysis/bound/proof.md holds for it, and
 with it the bound. With many values, the optimum is that of the simulator's shadowing.
 """
 

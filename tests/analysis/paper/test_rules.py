@@ -5,8 +5,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dess.analysis.answers.learning import Transfer
 from dess.analysis.answers.main_effects import LEVELS, PEAK, RISES, VALLEY, Shape
+from dess.analysis.answers.training.transfer import Transfer
 from dess.analysis.paper import rules, values
 from dess.analysis.paper.measures import Pairs, negate_changes
 from dess.analysis.paper.scorecard import RULES

@@ -9,7 +9,13 @@ import pytest
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import bounded_interval, mean_interval, share_interval
-from dess.analysis.stats.sequences import PARTS, add_values, new_sequence, sequence_ends
+from dess.analysis.stats.sequences import (
+    PARTS,
+    add_values,
+    ends_of_what_was_seen,
+    new_sequence,
+    sequence_ends,
+)
 
 PORTION = 25
 
@@ -59,6 +65,21 @@ def test_the_first_means_are_ruled_out_by_hand():
     assert 0 < low < 0.05
     assert capital(low) >= 2 / 0.5 > capital(low + 1 / PARTS)
     assert high == 1
+
+
+def test_what_was_seen_has_no_allowance_for_failures():
+    """With bounds or a failure, or without: the sequence of the values alone."""
+    values = np.random.default_rng(4).normal(0.02, 0.01, 200)
+    sequences = [new_sequence(-1.0, 1.0), new_sequence(-math.inf, math.inf, failure=1.0)]
+    alone = new_sequence(-math.inf, math.inf)
+    for sequence in (*sequences, alone):
+        add_values(sequence, values)
+    low, high = sequence_ends(alone)
+    assert 0 < low < values.mean() < high
+    assert ends_of_what_was_seen(alone) == (low, high)
+    for sequence in sequences:
+        assert ends_of_what_was_seen(sequence) == (low, high)
+        assert sequence_ends(sequence)[0] < 0
 
 
 @pytest.mark.parametrize("least, most", [(0.0, 1.0), (-1.0, 1.0), (0.0, math.inf)])

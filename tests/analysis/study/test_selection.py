@@ -212,6 +212,8 @@ def test_a_choice_needs_the_missions_of_round_one():
         ({"procedure": "kn-bounded", "indifference": 1.0, "metric": "reward"}, "not bounded"),
         ({"procedure": "kn", "indifference": 0.1, "confidence": 1.0}, "less than or equal to 0.99"),
         ({"procedure": "kn", "indifference": 0.1, "metric": "speed"}, "metric"),
+        ({"procedure": "kn-bounded", "indifference": 0.1, "metric": "least"}, "worst over all mis"),
+        ({"procedure": "kn", "indifference": 1.0, "metric": "oldest"}, "procedure cheapest that"),
     ],
 )
 def test_what_makes_no_sense_is_refused(fields, complaint):

@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dess.analysis.metrics import ALWAYS, METRICS, metric_of
-from dess.analysis.stats.intervals import interval_of, share_interval
-from dess.analysis.study.stopping import Precision, running_interval
+from dess.analysis import run_study
+from dess.analysis.answers.summary import reached_precisions
+from dess.analysis.metrics import ALWAYS, LEAST, METRICS, OLDEST, metric_for_length, metric_of
+from dess.analysis.stats.intervals import interval_of, share_interval, summary, worst_of_nodes
+from dess.analysis.study.stopping import Precision, running_interval, running_interval_of_worst
+from tests.analysis.small import SHEET, small_study
 
 
 def rule(**fields):
@@ -58,6 +63,33 @@ def test_missions_that_measure_nothing_are_left_out_of_running_intervals():
     own_means, own_widths = running_interval("waiting", values[[1, 3, 4]])
     assert means[[1, 2, 3, 4]].tolist() == own_means[[0, 0, 1, 2]].tolist()
     assert widths.tolist() == [np.inf, *own_widths[[0, 0, 1, 2]]]
+
+
+@pytest.mark.parametrize("column", [LEAST, OLDEST])
+def test_running_intervals_of_the_worst_node_are_those_of_the_statistics(column):
+    """The worst node, and the one with the worst end, change from one number to the next."""
+    metric = replace(metric_for_length(column, 400, None), among=6)
+    spread = np.linspace(0.5, 8, 6)
+    values = np.random.default_rng(6).beta(spread, spread, (300, 6)) * metric.range[1]
+    means, widths = running_interval_of_worst(metric, values)
+    own = values.argmax(axis=1) if metric.less_is_better else values.argmin(axis=1)
+    assert len({*own}) == 6
+    for n in (1, 2, 3, 10, 40, 300):
+        found = interval_of(metric, worst_of_nodes(values[:n], metric))
+        half = (found.high - found.low) / 2 if metric.is_bounded or n > 1 else np.inf
+        assert (means[n - 1], widths[n - 1]) == pytest.approx((found.mean, half), rel=1e-9)
+
+
+def test_a_target_of_the_worst_node_is_met_at_the_interval_that_is_printed(tmp_path):
+    rule = {"first": 5, "look_ahead": 3, "budget": 400, "targets": {"least": {"absolute": 0.06}}}
+    study = small_study(tmp_path, precision=rule, policies=["greedy"], set={**SHEET, "uavs": 2})
+    results = run_study(study, tmp_path / "out")
+    (row,) = reached_precisions(results).itertuples()
+    (printed,) = summary(results.missions).query("metric == 'least'").itertuples()
+    assert row.met and row.stop + 3 == row.missions == len(results.missions) < 400
+    assert row.mean == pytest.approx(printed.mean)
+    assert row.half_width == pytest.approx((printed.high - printed.low) / 2)
+    assert 0.03 < row.half_width <= row.target == 0.06
 
 
 @pytest.mark.parametrize("metric", ALWAYS)

@@ -14,15 +14,28 @@ import pytest
 from playwright.sync_api import Page as Tab
 
 from dess import InputError, load_scenario, policies, simulate_batch
-from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
-from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.sequences import (
+    add_values,
+    ends_of_what_was_seen,
+    new_sequence,
+    sequence_ends,
+)
+from dess.analysis.stats.verdict import (
+    ABOVE,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_ABOVE,
+    position_of,
+    position_with_allowance,
+)
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import index
 from dess.reports.pages import panel as panels
-from dess.reports.pages.html import fill_page
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import (
@@ -33,6 +46,7 @@ from dess.reports.pages.panel import (
     make_another,
     make_panel,
 )
+from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
@@ -42,6 +56,12 @@ PAPER = load_scenario("paper")
 SEED = 7
 MISSIONS = 120  # of a run
 PATIENCE = 60_000  # ms
+# How the panel begins to say the verdict on a difference.
+SAID = {
+    ABOVE: "decided: B is higher",
+    SEEN_ABOVE: f"{SEEN_ABOVE.removeprefix('above ')}, B is higher, which is better; ",
+    INCONCLUSIVE: "no",
+}
 
 
 @pytest.fixture(scope="module")
@@ -306,6 +326,34 @@ def test_the_page_simulates_what_python_does(visit, document):
     assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
 
 
+def test_what_is_decided_but_for_a_rare_failure_is_so_in_what_was_seen(visit, document):
+    """As the verdict of a study: its words, and its rule with intervals that may be watched."""
+    few = 30
+    sides = [
+        simulate_batch(load_scenario("paper", uavs=uavs), policies.load("greedy"), SEED, few)
+        for uavs in (1, 2)
+    ]
+    tab = visit(document, 1280).page
+    run(tab, few)
+    verdicts = set()
+    for metric in METRICS:
+        before, after = (records.missions[metric].astype(float) for records in sides)
+        bound = 1.0 if metric_of(metric).is_bounded else np.inf
+        sequence = new_sequence(-bound, bound, failure=metric_of(metric).failure)
+        add_values(sequence, after - before)
+        low, high = sequence_ends(sequence)
+        whole = position_of(Interval(0.0, low, high))
+        without = position_of(Interval(0.0, *ends_of_what_was_seen(sequence)))
+        verdict = position_with_allowance(whole, without)
+        if metric_of(metric).is_outcome:
+            verdict = whole
+        said = cells_of(tab, metric_of(metric).name)[3]
+        verdicts.add(verdict)
+        assert said.startswith(SAID[verdict]), metric
+        assert (NOT_RULED_OUT in said) == (verdict == SEEN_ABOVE), metric
+    assert SEEN_ABOVE in verdicts
+
+
 def test_what_is_neither_better_nor_worse_is_not_called_so(visit, tmp_path):
     """Requests for a pad and the utilisation are decided, and no more; they are not required."""
     baseline, variation = (
@@ -468,7 +516,7 @@ def test_a_requirement_is_judged_by_the_intervals(visit, document):
     for bound in (ends[0][0] - 1, sum(ends[0]) / 2, ends[0][1] + 1, ends[1][1] + 1):
         tab.locator("[name=bound-0]").fill(str(bound))
         words = [
-            "meets" if low > bound else "misses" if high < bound else "open" for low, high in ends
+            "met" if low > bound else "missed" if high < bound else "open" for low, high in ends
         ]
         marks = tab.locator("[data-panel=verdicts] strong").all_text_contents()
         assert marks == words
@@ -527,9 +575,9 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
     grid = grid_of(tab)
     assert {fleet: look for fleet, (look, _) in grid.items()} == {
-        (1, 1): "misses",
-        (1, 4): "misses",
-        (2, 1): "meets cheapest",
+        (1, 1): "missed",
+        (1, 4): "missed",
+        (2, 1): "met cheapest",
         (2, 4): "open",  # it costs more than one that meets the requirements
     }
     assert "30 missions" in grid[2, 4][1]
@@ -559,7 +607,7 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     assert lines[1] == f"# {command}"
     assert len(lines) == 3 + len(grid)
     looks = {fleet: look for fleet, (look, _) in grid_of(tab).items()}
-    assert (looks[1, 1], looks[2, 1]) == ("open", "meets leading")
+    assert (looks[1, 1], looks[2, 1]) == ("open", "met leading")
     tab.locator("[name=bound-0]").fill("20")
     assert "The cheapest is 1 UAV, 1 pad for 1,300 EUR" in str(status.text_content())
     tab.locator("[name=a-max_slots]").press("Home")

@@ -11,9 +11,9 @@ import pytest
 
 from dess import InputError
 from dess.analysis import load_results
-from dess.analysis.answers import comparison
-from dess.analysis.answers.comparison import Cost, Times
 from dess.analysis.answers.missions import FOLDER
+from dess.analysis.answers.policies import decision_times
+from dess.analysis.answers.policies.decision_times import Cost, Times
 from dess.analysis.results.tables import Results
 from dess.reports.pages.notebook import NAMES, read_report
 from dess.reports.pages.page import STUDY, Page
@@ -63,7 +63,7 @@ def timed(results: Results, **_: Any) -> Times:
 def files(results, out):
     """All files of the reports, rendered once, by name."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(comparison, "measure_decision_times", timed)
+        patch.setattr(decision_times, "measure_decision_times", timed)
         render([], results, out, parameters=QUICK)
     return {path.name: path.read_text("utf-8") for path in out.iterdir()}
 

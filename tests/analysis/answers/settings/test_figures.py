@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from dess.analysis.answers.comparison import plot_decision_times
+from dess.analysis.answers.policies.decision_times import plot_decision_times
 from dess.analysis.answers.settings.effects import average_over_others
 from dess.analysis.answers.settings.figures import (
     MOST_PANELS,

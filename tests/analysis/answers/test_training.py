@@ -11,14 +11,26 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis import marl_eval_data, rliable_scores
-from dess.analysis.answers import learning
-from dess.analysis.answers.learning import (
+from dess.analysis.answers.training import exports
+from dess.analysis.answers.training.curves import (
+    ALPHA,
     CURVE,
     CURVES,
-    FINAL,
-    difference_of_trainings,
+    pairs_in,
     read_curve,
     read_curves,
+    settling_position,
+    smooth_curves,
+)
+from dess.analysis.answers.training.trained import Trained, curves_by_learner
+from dess.analysis.answers.training.transfer import compare_all_transfers, compare_transfer
+from dess.analysis.answers.training.variants import (
+    FINAL,
+    compare_variants,
+    difference_of_trainings,
+    methods_sentence,
+    rows_of_ladder,
+    without_each,
 )
 from dess.analysis.metrics import SUCCESS
 from dess.analysis.results.tables import Results
@@ -54,7 +66,7 @@ def finals(**products: list[float]) -> pd.DataFrame:
 
 
 def test_intervals_of_shares_end_where_these_do():
-    table = learning.compare_variants(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
+    table = compare_variants(finals(base=[1.0, 0.9, 0.2], once=[0.73]), "base")
     base = table.set_index("variant").loc["base"]
     assert (base["low"], base["high"]) == (0.0, 1.0)
     assert (base["new_low"], base["new_high"]) == (0.0, 1.0)
@@ -83,29 +95,27 @@ def several(variant, ends, level=0.0, before=0):
 
 def compared(using, without, **options):
     both = pd.concat([several("with", using, **options), several("without", without)])
-    return learning.compare_transfer(
-        learning.smooth_curves(both, METRIC), "with", "without", STEPS[-1]
-    )
+    return compare_transfer(smooth_curves(both, METRIC), "with", "without", STEPS[-1])
 
 
 def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
-    table = learning.smooth_curves(training("one", 1, [4.0, 0.0, 8.0, 16.0], before=2), METRIC)
-    a = learning.ALPHA
+    table = smooth_curves(training("one", 1, [4.0, 0.0, 8.0, 16.0], before=2), METRIC)
+    a = ALPHA
     assert table["value"].tolist() == [4.0, 4.0 * (1 - a), 8.0, 8.0 * (1 - a) + 16.0 * a]
     assert table["updates"].tolist() == STEPS
 
 
 def test_a_curve_has_settled_where_it_stays_near_its_end():
     averages = pd.Series([0.2, 0.55, 0.725])
-    assert [learning.settling_position(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
+    assert [settling_position(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
 
 
 def test_pairs_need_trainings_of_both_variants():
     curves = pd.concat(
         [several("quick", [1.0]), several("no transfer", [1.0]), several("no guard", [1.0])]
     )
-    assert learning.pairs_in(curves) == {"all methods of this project": ("quick", "no transfer")}
-    (key,) = learning.compare_all_transfers(curves, [METRIC], shortest=STEPS[-1])
+    assert pairs_in(curves) == {"all methods of this project": ("quick", "no transfer")}
+    (key,) = compare_all_transfers(curves, [METRIC], shortest=STEPS[-1])
     assert key == ("all methods of this project", METRIC)
 
 
@@ -132,8 +142,8 @@ def test_transfer_is_judged_by_the_interval_of_the_end(using, without, level, ve
     late = compared(using, without, level=level, before=2)
     assert late.since is None or late.since >= STEPS[2]
     both = pd.concat([several("with", using), several("without", without)])
-    averages = learning.smooth_curves(both, METRIC)
-    short = learning.compare_transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
+    averages = smooth_curves(both, METRIC)
+    short = compare_transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
     assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
 
 
@@ -194,7 +204,7 @@ def test_a_run_of_a_policy_without_trainings_is_a_block_of_missions(results):
 
 def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypatch):
     monkeypatch.setattr(
-        learning, "trained_policies_by_learner", lambda _: {"learner": ["random", "tour"]}
+        exports, "trained_policies_by_learner", lambda _: {"learner": ["random", "tour"]}
     )
     scores = rliable_scores(results, OF_RUNS)
     assert [*scores] == ["learner", "greedy"]
@@ -209,7 +219,7 @@ def test_a_run_of_a_learner_is_a_training_on_its_own_missions(results, monkeypat
 
 def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch):
     monkeypatch.setattr(
-        learning, "trained_policies_by_learner", lambda _: {"a,b": ["random", "tour"]}
+        exports, "trained_policies_by_learner", lambda _: {"a,b": ["random", "tour"]}
     )
     data = json.loads(json.dumps(marl_eval_data(results, ["success", OF_RUNS])))
     scores = rliable_scores(results, OF_RUNS)
@@ -233,7 +243,7 @@ def test_what_has_no_scores_is_refused(results, studied, monkeypatch):
     with pytest.raises(InputError, match="missions: 9 for 10 runs"):
         rliable_scores(few)
     unequal = {"a": ["greedy"] * 2, "b": ["tour"] * 3}
-    monkeypatch.setattr(learning, "trained_policies_by_learner", lambda _: unequal)
+    monkeypatch.setattr(exports, "trained_policies_by_learner", lambda _: unequal)
     with pytest.raises(InputError, match=r"trainings: \[2, 3\]"):
         rliable_scores(results)
 
@@ -241,8 +251,8 @@ def test_what_has_no_scores_is_refused(results, studied, monkeypatch):
 def test_trainings_that_differ_in_their_seed_are_of_one_learner():
     configs = {"one": tiny(seed=1), "two": tiny(seed=2), "other": tiny(seed=1, discount=0.9)}
     curve = pd.DataFrame({"updates": [250, 500]})
-    trained = [learning.Trained(name, config, curve) for name, config in configs.items()]
-    sizes = learning.curves_by_learner(trained).groupby(["variant", "seed"]).size()
+    trained = [Trained(name, config, curve) for name, config in configs.items()]
+    sizes = curves_by_learner(trained).groupby(["variant", "seed"]).size()
     assert sizes.to_dict() == {("one and two", 1): 2, ("one and two", 2): 2, ("other", 1): 2}
 
 
@@ -256,11 +266,11 @@ def test_the_answer_names_no_largest_step_and_counts_what_is_needed():
     one_less = {"no guard": [0.6] * 3, "no low-battery starts": [0.7] * 3}
     one_less["no early returns"] = [0.7] * 3
     last = of({"none of the three": [0.0] * 3, **one_less, "quick": [0.7, 0.7, 0.8]})
-    said = learning.methods_sentence(learning.rows_of_ladder(last))
+    said = methods_sentence(rows_of_ladder(last))
     assert "step" not in said and "rises" not in said
     assert "0 of 3 (the paper's methods)" in said
-    assert "3 of 3 without the guard" in learning.without_each(last)
-    assert learning.without_each(last).endswith("no single method is needed for it.")
+    assert "3 of 3 without the guard" in without_each(last)
+    assert without_each(last).endswith("no single method is needed for it.")
     failing = of(one_less | {"no guard": [0.6, 0.0, 0.0]})
-    assert "1 of 3 without the guard" in learning.without_each(failing)
-    assert "needed" not in learning.without_each(failing)
+    assert "1 of 3 without the guard" in without_each(failing)
+    assert "needed" not in without_each(failing)

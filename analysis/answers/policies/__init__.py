@@ -1,0 +1,1 @@
+"""Pairs of policies in the same missions, and the times of their decisions."""

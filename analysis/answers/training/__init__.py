@@ -1,0 +1,1 @@
+"""Trainings: their curves, variants, transfer learning and trained policies."""
