@@ -1,4 +1,4 @@
-"""Which zone each UAV counts on where some zone has fewer cells than there are UAVs.
+"""Which zone each UAV counts on where the UAVs together would fill some zone.
 
 If each chose the best zone for itself, two UAVs could count on the last cell of a small zone, and
 the one that comes second may be too far from any other. So all UAVs are matched to the cells of
@@ -6,6 +6,9 @@ zones together: no zone gets more UAVs than it has cells, and the battery and th
 lack for their ways home are the least possible. A safe move keeps the zone in reach to which the
 state before it matches the UAV. So if no UAV lacks anything in one slot, there is such a matching
 in the next one as well. The start zone has a cell for each UAV, so there always is a matching.
+
+In a full zone, UAVs are matched to its cells in the same way, by the squares of their ways. Cells
+that UAVs close off by those that they keep do not count.
 
 Where UAVs take turns at pads, the plan of pads (``dess.model.guard.queues``) tells the zones.
 """
@@ -24,15 +27,6 @@ from dess.physics.landing import lands
 # the margin, and if it is not possible at all. No sum of lesser prices comes near a larger one.
 _LACKING, _UNREACHABLE = 2**24, 2**52
 _NO_WAY = 2**60
-
-
-@inlined
-def is_tight(mission, chart):
-    """Whether all UAVs together would fill some zone."""
-    for zone in range(mission.zones):
-        if chart.sizes[zone] <= mission.uavs:
-            return True
-    return False
 
 
 @inlined
@@ -156,23 +150,45 @@ def _kept_cells(mission, uavs, chart):
 
 @shared_kernel
 def _shut_cells(mission, uavs, chart, closed):
-    """(Z,) How many cells of each zone no UAV can come to, since UAVs keep all cells beside them."""
+    """How many cells of each zone are shut: no UAV is there, and UAVs keep all cells beside it.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        chart: ``Chart``.
+        closed: The numbers of the cells that UAVs keep.
+
+    Returns:
+        (Z,) the cells.
+    """
     shut = np.zeros_like(chart.sizes)
     if len(closed) == 0:
         return shut
-    width = chart.zones.shape[1]
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-        is_open_beside = (closed == y * width + x).any()  # the UAV that keeps it is there
-        for j in range(mission.uavs):
-            is_open_beside = is_open_beside or (uavs[j].active and uavs[j].x == x and uavs[j].y == y)
-        for action in range(4):
-            beside_x, beside_y = x + STEP_X[action], y + STEP_Y[action]
-            is_kept = (closed == beside_y * width + beside_x).any()
-            is_open_beside = is_open_beside or (is_open(chart, beside_x, beside_y) and not is_kept)
-        if not is_open_beside:
+        if not _has_uav(mission, uavs, x, y) and not _can_be_entered(chart, closed, x, y):
             shut[chart.zones[y, x]] += 1
     return shut
+
+
+@inlined
+def _has_uav(mission, uavs, x, y):
+    """Whether an active UAV is in a cell."""
+    count = 0
+    for j in range(mission.uavs):
+        count += uavs[j].active and uavs[j].x == x and uavs[j].y == y
+    return count > 0
+
+
+@shared_kernel
+def _can_be_entered(chart, closed, x, y):
+    """Whether one of the cells beside a cell is open, and no UAV keeps it."""
+    for action in range(4):
+        from_x, from_y = x + STEP_X[action], y + STEP_Y[action]
+        number = from_y * chart.zones.shape[1] + from_x
+        if is_open(chart, from_x, from_y) and not (closed == number).any():
+            return True
+    return False
 
 
 @shared_kernel
@@ -184,8 +200,8 @@ def spread_out(prices, places, left):
     (successive shortest paths).
 
     Args:
-        prices: (I, P) the price of each place for each UAV; that of a UAV that stays is ``_NO_WAY``.
-        places: (I,) the place of each UAV, -1 for UAVs without one; the result is written into it.
+        prices: (I, P) the price of each place for each UAV, ``_NO_WAY`` for one that stays.
+        places: (I,) the place of each UAV, or -1; the result is written into it.
         left: (P,) the room that is left in each place, negative where there are too many UAVs.
     """
     for place in range(len(left)):

@@ -15,7 +15,6 @@ from dess.model.guard.battery import (
     usable_battery,
     will_charge,
 )
-from dess.model.guard.matching import is_tight
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import (
@@ -25,6 +24,7 @@ from dess.model.guard.ways import (
     cells_home,
     is_late,
     is_parked,
+    is_tight,
 )
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
@@ -99,9 +99,10 @@ def _ceded(mission, uavs, i):
 
 @inlined
 def _into_cells_of_others(mission, uavs, i, chart, memory):
-    """The moves of UAV ``i`` into zone cells of teammates that choose before it or have less battery.
+    """The moves of UAV ``i`` into zone cells that teammates count on.
 
-    If such a cell was taken shortly before the teammate comes, it would have to fly on to another.
+    Those are teammates that choose before it or have less battery. If such a cell was taken shortly
+    before the teammate comes, it would have to fly on to another.
 
     Returns:
         A bit for each action.

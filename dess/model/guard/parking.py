@@ -6,7 +6,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import dearest_slot, late_slots, usable_battery
-from dess.model.guard.matching import is_tight, keeps_cell, match_zones
+from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     KEPT,
     QUEUE,
@@ -17,7 +17,13 @@ from dess.model.guard.queues import (
     plan_pads,
     waits_in_zone,
 )
-from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
+from dess.model.guard.ways import (
+    battery_of_way,
+    is_crowded,
+    is_parked,
+    is_tight,
+    path_length,
+)
 from dess.model.ways_home import is_calm
 from dess.physics.chart import distance
 from dess.physics.landing import lands
