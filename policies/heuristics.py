@@ -12,12 +12,12 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import (
-    dearest_slot,
     late_slots,
     margin,
     margin_slots,
     slots_needed,
     usable_battery,
+    waiting_slot,
 )
 from dess.model.guard.moves import contest, contests, guide_uav
 from dess.model.guard.parking import parking_memory
@@ -244,7 +244,7 @@ def _choose_goal(
     spare = slots_needed(mission, u)
     if charge:
         spare = usable_battery(mission, u) - margin(mission, u)
-        spare -= dearest_slot(mission) * (1 + home.wait)
+        spare -= waiting_slot(mission) * (1 + home.wait)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best = 0.0
     node = -1

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.model.channel import mean_snr_at
-from dess.model.guard.battery import dearest_slot, margin
+from dess.model.guard.battery import margin, waiting_slot
 from dess.model.state import constants_of, types_of
 from dess.model.ways import FAR as WAYS_FAR
 from dess.model.ways import move_costs, relax
@@ -160,7 +160,7 @@ def _battery_of_guard(space: ScenarioSpace, uav: int) -> int:
     mission = constants_of(space).view(np.recarray)[0]
     mission.active = space.uavs[1]
     u = types_of(space).view(np.recarray)[uav]
-    return int(margin(mission, u) + dearest_slot(mission))
+    return int(margin(mission, u) + waiting_slot(mission))
 
 
 def _cells_along_a_line(costs: Costs, battery: int) -> int:

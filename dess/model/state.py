@@ -73,10 +73,12 @@ MISSION = np.dtype(
         ("step_snr", np.float64, MOST_STEPS),
         ("step_rate", np.float64, MOST_STEPS),
         # Energy: what a slot takes [% / 1000], by the slots per cell and the action, and the most
-        # that one takes; whether this is not one percent everywhere.
+        # that one takes; whether this is not one percent everywhere; and what the return guard
+        # counts for a slot of waiting.
         ("has_costs", np.int64),
         ("slot_costs", np.int16, SPEEDS * ACTIONS),
         ("dearest_slot", np.int64),
+        ("waiting_slot", np.int64),
         ("energy", np.int64),  # which of the energies of a batch it is
         # What the mean wind takes of the four moves and its deviation from cell to cell [% of
         # battery per cell], which count where gusts blow.

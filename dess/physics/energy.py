@@ -137,6 +137,8 @@ def energy_constants(
         "has_costs": consumption.is_on or wind.blows,
         "slot_costs": costs.reshape(-1),
         "dearest_slot": most_expensive,
+        # In wind a UAV that waits hovers; where hovering may cost the most, any slot may.
+        "waiting_slot": most_expensive if consumption.is_on else PERCENT,
         **_gust_constants(wind),
     }
 

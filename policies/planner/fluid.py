@@ -25,7 +25,7 @@ from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import (
     MARGIN_PER_TEAMMATE,
     SCARCE_SLOTS,
-    dearest_slot,
+    waiting_slot,
 )
 from dess.model.guard.ways import battery_of_flight
 from dess.model.state import HOVER, STEP_X, STEP_Y, fields
@@ -448,8 +448,8 @@ def _penalty_for_unplanned_charge(mission, v, active, data_left):
     lacking = v.quota - v.counted
     spare = v.battery
     if data_left * m < 0.2 * lacking * active:
-        spare -= SCARCE_SLOTS * mission.flight_cost * dearest_slot(mission)
-    needed = lacking * mission.flight_cost * dearest_slot(mission)
+        spare -= SCARCE_SLOTS * mission.flight_cost * waiting_slot(mission)
+    needed = lacking * mission.flight_cost * waiting_slot(mission)
     return _UNPLANNED if spare * m < needed else 0.0
 
 
@@ -538,7 +538,7 @@ def _begin_to_charge(mission, v, active):
     v.charge_slots = 0
     v.battery = before
     _charge_for_slot(mission, v)
-    kept = dearest_slot(mission) * (1 + _slots_for_detours(mission, v, active))
+    kept = waiting_slot(mission) * (1 + _slots_for_detours(mission, v, active))
     lacking = max(kept - before, 0)
     return _LATE * lacking / PERCENT
 

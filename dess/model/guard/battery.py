@@ -3,8 +3,8 @@
 The guard counts batteries in thousandths of a percent (``dess.physics.energy``). Where slots take
 anything else than one percent each, the battery is no time any more, so that both must last: the
 battery for the cheapest way home, and the slots that are left for the shortest one. A slot of
-waiting counts as the dearest one; a slot of a margin counts half of the dearest way forth and back,
-since a detour is one.
+waiting counts as ``waiting_slot``; a slot of a margin counts half of the dearest way forth and
+back, since a detour is one.
 """
 
 import math
@@ -106,21 +106,21 @@ def must_charge(mission, u, data):
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
-    return thousandths_left(u) < mission.flight_cost * dearest_slot(mission) * needed
+    return thousandths_left(u) < mission.flight_cost * mission.dearest_slot * needed
 
 
 @inlined
 def will_charge(mission, u):
     """Whether a UAV in the air cannot fill its quota with its battery, or has to land."""
-    least = dearest_slot(mission) * slots_needed(mission, u)
+    least = waiting_slot(mission) * slots_needed(mission, u)
     needs = thousandths_left(u) < mission.flight_cost * least
     return flies(u) and (needs or lands(mission) or has_limit(mission))
 
 
 @inlined
-def dearest_slot(mission):
-    """The battery that a slot of waiting or of a detour counts [% / 1000]."""
-    return mission.dearest_slot
+def waiting_slot(mission):
+    """The battery that a slot of waiting counts [% / 1000]."""
+    return mission.waiting_slot
 
 
 @inlined
@@ -132,7 +132,7 @@ def usable_battery(mission, u):
     """
     if not lands(mission):
         return thousandths_left(u)
-    most = (mission.max_slots - mission.slot) * dearest_slot(mission)
+    most = (mission.max_slots - mission.slot) * waiting_slot(mission)
     if mission.flight_cost == 0:
         return most
     if has_costs(mission):
@@ -179,7 +179,7 @@ def cannot_leave(mission, u):
     if own_limit(mission, u) == 0 and u.slots_per_cell == 1:
         return False
     slots = margin_slots(mission, u) + 2 * u.slots_per_cell + 1
-    return thousandths_left(u) <= dearest_slot(mission) * slots
+    return thousandths_left(u) <= waiting_slot(mission) * slots
 
 
 @inlined
@@ -194,7 +194,7 @@ def _slot_of_detour(mission, u):
     if not has_costs(mission):
         return PERCENT
     if mission.gusts > 0.0:  # the gusts of two cells are hardly ever both the strongest
-        return (PERCENT + dearest_slot(mission) + 1) // 2
+        return (PERCENT + mission.dearest_slot + 1) // 2
     slots = u.slots_per_cell
     across = slot_cost(mission, slots, NORTH) + slot_cost(mission, slots, SOUTH)
     along = slot_cost(mission, slots, EAST) + slot_cost(mission, slots, WEST)

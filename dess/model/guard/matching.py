@@ -16,7 +16,7 @@ Where UAVs take turns at pads, the plan of pads (``dess.model.guard.queues``) te
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import dearest_slot, late_slots, margin, margin_slots, usable_battery
+from dess.model.guard.battery import late_slots, margin, margin_slots, usable_battery, waiting_slot
 from dess.model.guard.queues import find_ways, is_given_up, needs_pad
 from dess.model.guard.ways import battery_of_way, is_parked
 from dess.model.state import STEP_X, STEP_Y
@@ -89,9 +89,9 @@ def match_zones(mission, uavs, data, chart, plan, reach):
 def _price(mission, u, spent, slots):
     """The price of a way home that takes so much battery and so many slots."""
     usable = usable_battery(mission, u)
-    needed = spent + dearest_slot(mission)
+    needed = spent + waiting_slot(mission)
     late = late_slots(mission, slots + 1 + margin_slots(mission, u))
-    lacking = max(needed + margin(mission, u) - usable, dearest_slot(mission) * late, 0)
+    lacking = max(needed + margin(mission, u) - usable, waiting_slot(mission) * late, 0)
     price = spent + _LACKING * lacking
     if needed > usable or late_slots(mission, slots + 1) > 0:
         price += _UNREACHABLE
@@ -127,7 +127,7 @@ def _match_cells(mission, uavs, zone, chart, turns, closed, reach):
                 way = length_around(chart.zones, chart.ways, chart.rows, closed, u.x, u.y, x, y)
             spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, way, reach)
             prices[j, place] = min(spent, _LACKING) ** 2
-            if spent + dearest_slot(mission) > usable_battery(mission, u):
+            if spent + waiting_slot(mission) > usable_battery(mission, u):
                 prices[j, place] += _UNREACHABLE
         places[j] = np.argmin(prices[j])
         left[places[j]] -= 1

@@ -6,12 +6,12 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import (
-    dearest_slot,
     late_slots,
     margin,
     margin_slots,
     must_charge,
     usable_battery,
+    waiting_slot,
     will_charge,
 )
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
@@ -168,7 +168,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     parked = is_parked(mission, u) and not (lands(mission) and home.gives_way == 1)
     if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
-    reserve = margin(mission, u) + dearest_slot(mission) * home.wait if charge else 0
+    reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, those after which it is reached if the margin and the
     # slots for a pad are spent, and those that lead to a cell that no teammate contests.
@@ -202,7 +202,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
                 fewest = min(fewest, needed)
                 kept = max(kept, _wait(mission, u, chart, action, x, y, home))
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late = max(needed + dearest_slot(mission) + kept - usable_battery(mission, u), 0)
+            late = max(needed + waiting_slot(mission) + kept - usable_battery(mission, u), 0)
             late = max(late, _late_home(mission, uavs, i, chart, planned, action, x, y, home))
         bit = 1 << action
         if contested == 0:
@@ -263,7 +263,7 @@ def _late_home(mission, uavs, i, chart, planned, action, x, y, home):
     u = uavs[i]
     cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
     slots = cells * u.slots_per_cell + (1 if action == HOVER else u.slots_per_cell)
-    return dearest_slot(mission) * late_slots(mission, slots + 1 + margin_slots(mission, u))
+    return waiting_slot(mission) * late_slots(mission, slots + 1 + margin_slots(mission, u))
 
 
 @inlined
@@ -306,10 +306,10 @@ def _wait(mission, u, chart, action, x, y, home):
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
     if home.begins <= arrives:
         return 0
-    slots = home.begins - arrives
+    battery = (home.begins - arrives) * waiting_slot(mission)
     if has_costs(mission):
-        slots += 2
-    return slots * dearest_slot(mission)
+        battery += 2 * mission.dearest_slot
+    return battery
 
 
 @inlined

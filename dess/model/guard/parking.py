@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import dearest_slot, late_slots, usable_battery
+from dess.model.guard.battery import late_slots, usable_battery, waiting_slot
 from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     KEPT,
@@ -172,7 +172,7 @@ def _leaves_cell(mission, u, zone, home, plan):
     if u.zone < 0 or zone < 0:
         return False
     is_elsewhere = u.x != home.x or u.y != home.y
-    kept = dearest_slot(mission) * (home.cells * u.slots_per_cell + 1 + KEPT)
+    kept = waiting_slot(mission) * (home.cells * u.slots_per_cell + 1 + KEPT)
     moves_on = not u.overruled and usable_battery(mission, u) > kept
     return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere and moves_on)
 

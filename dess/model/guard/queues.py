@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import dearest_slot, must_charge
+from dess.model.guard.battery import must_charge, waiting_slot
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import HOVER
 from dess.physics.charging import charge_limit, is_before, slots_to_charge
@@ -190,13 +190,13 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
 @inlined
 def _slots_of(mission, battery):
     """The slots that a battery lasts for a UAV that waits in the air."""
-    return battery // dearest_slot(mission)
+    return battery // waiting_slot(mission)
 
 
 @inlined
 def _slots_of_percent(mission, percent):
     """The slots that so many percent of a battery last for a UAV that waits in the air."""
-    return PERCENT * percent // dearest_slot(mission)
+    return PERCENT * percent // waiting_slot(mission)
 
 
 @inlined
@@ -217,7 +217,7 @@ def find_ways(mission, u, turn, chart, reach):
         zone = np.int64(chart.zones[y, x])
         cells = distance(chart, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
-        spent += u.slots_left * dearest_slot(mission)
+        spent += u.slots_left * mission.dearest_slot
         slots = cells * u.slots_per_cell + u.slots_left
         least = turn.spent[zone]
         if least < 0 or spent < least or (spent == least and slots < turn.way[zone]):
@@ -374,7 +374,7 @@ def _is_next(mission, uavs, j, other, order, time, plan):
 def _time_on_pad(mission, uavs, j, begins, plan):
     """The slots for which UAV ``j`` charges if it begins so many slots from now."""
     empty = plan.turns[j].deadline + 1 - begins  # the slots that are left of its battery then
-    percent = max(empty, 0) * dearest_slot(mission) // PERCENT
+    percent = max(empty, 0) * waiting_slot(mission) // PERCENT
     return _charging_time(mission, uavs[j], plan.turns[j].zone, percent)
 
 

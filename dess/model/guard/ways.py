@@ -5,7 +5,7 @@ import heapq
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import cannot_leave, dearest_slot, ends_soon, usable_battery
+from dess.model.guard.battery import cannot_leave, ends_soon, usable_battery, waiting_slot
 from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
 from dess.model.ways import FAR, is_calm
 from dess.physics.charging import longest_charge
@@ -150,7 +150,7 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
         return False
     u = uavs[i]
     spent = battery_home(mission, uavs, i, chart, planned, u.x, u.y, home, reach)
-    return spent + dearest_slot(mission) + kept > usable_battery(mission, u)
+    return spent + waiting_slot(mission) + kept > usable_battery(mission, u)
 
 
 @shared_kernel
@@ -172,7 +172,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     width, slots = chart.zones.shape[1], uavs[i].slots_per_cell
     least = reach[mission.energy, chart.nearest[home.y, home.x], slots - 1].ravel()
     start = np.int64(y * width + x)
-    waits = dearest_slot(mission) * longest_charge(mission, uavs)
+    waits = waiting_slot(mission) * longest_charge(mission, uavs)
     through = np.int64(least[start]) + waits
     spent = np.full(chart.zones.size, FAR, np.int64)
     spent[closed] = -1
@@ -204,7 +204,7 @@ def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery for a way home of so many cells, those of a detour included [% / 1000]."""
     if reach is None or len(reach) == 0:
         return PERCENT * cells
-    dearest = u.slots_per_cell * dearest_slot(mission)
+    dearest = u.slots_per_cell * mission.dearest_slot
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
     detour = cells - distance(chart, x, y, home_x, home_y)
