@@ -101,9 +101,9 @@ show_parts(
 page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
-from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.assumptions import assumption_sentences, limit_sentences
 
-render_part("assumptions.html", lines=assumption_sentences(study, by))
+render_part("assumptions.html", lines=[*assumption_sentences(study, by), *limit_sentences(study)])
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
