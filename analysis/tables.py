@@ -14,7 +14,7 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.names import field_named, value_text
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import MARKS, judge_by_tests
 
 INTERVALS = f"{numbers.format_level(LEVEL)} intervals"

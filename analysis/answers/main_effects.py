@@ -25,7 +25,8 @@ from dess.analysis.metrics import METRICS, PRODUCT, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare_pairs
-from dess.analysis.stats.intervals import LEVEL, by_replication
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import BARS, INTERVALS
 
 _ENDS = ["difference", "low", "high"]

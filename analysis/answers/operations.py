@@ -29,8 +29,10 @@ from dess.analysis.metrics import (
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import column_tests, relative_change
-from dess.analysis.stats.intervals import LEVEL, Interval, by_replication, check_share
+from dess.analysis.stats.differences import compare_pairs, relative_change
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_share
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
@@ -40,6 +42,7 @@ from dess.analysis.stats.verdict import (
     position_of,
     position_with_allowance,
 )
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import WIDER, allowance_sentence
 
 # The published changes of the average age of information, from one UAV to this number, in another
@@ -134,8 +137,9 @@ def changes_from_reference(
                 plain = relative_change(*pairs)
                 change = (*relative_change(*pairs, measure), (plain.high - plain.low) / 2)
             else:
-                tests = column_tests(both[[point]], both[partner], measure)
-                change = tests[["difference", "low", "high", "student"]].iloc[0]
+                values = both.to_numpy(float)
+                pair = compare_pairs(values[:, 0], values[:, 1], metric=measure)
+                change = (*pair[:3], pair.student)
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])
 

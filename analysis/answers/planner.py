@@ -24,7 +24,9 @@ from dess.analysis.results.event_log import uav_slots
 from dess.analysis.results.resimulate import Mission
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare, difference_test, differences_of, t_test
-from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import column_intervals
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,

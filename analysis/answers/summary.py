@@ -32,16 +32,13 @@ from dess.analysis.stats.differences import (
     insert_adjusted,
 )
 from dess.analysis.stats.distribution import distribution
-from dess.analysis.stats.intervals import (
-    Interval,
-    by_replication,
-    level_after,
-    summary,
-    values_within,
-)
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.learners import compare_learners
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.stats.verdict import MARKS, Verdict, position_of
+from dess.analysis.stats.weights import by_replication, values_within
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
@@ -70,7 +67,7 @@ def means_of_points(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy, design point and metric, as ``dess.analysis.summary`` returns it. After a
-        search, the intervals allow for it (``stats.intervals.level_after``).
+        search, the intervals allow for it (``stats.kinds.level_after``).
     """
     cell = ["policy", "point"]
     looks = {name: results.looks(name) for name in results.policies}

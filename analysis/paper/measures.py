@@ -18,14 +18,9 @@ from dess.analysis.names import field_named, value_text
 from dess.analysis.paper import values
 from dess.analysis.paper.rules import MARGIN
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import (
-    LEVEL,
-    Interval,
-    bounded_interval,
-    mean_interval,
-    share_interval,
-)
-from dess.analysis.stats.intervals import summary as means_of
+from dess.analysis.stats.groups import summary as means_of
+from dess.analysis.stats.intervals import Interval, bounded_interval, mean_interval, share_interval
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
 

@@ -12,7 +12,8 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from dess.analysis.metrics import Metric, metric_of
-from dess.analysis.stats.intervals import LEVEL, level_after, rare_differences
+from dess.analysis.stats.differences import rare_differences
+from dess.analysis.stats.kinds import LEVEL, level_after
 from dess.analysis.stats.verdict import SEEN_WORSE, WORSE
 
 # How an alternative compares with all others by a metric, beside ``SEEN_WORSE`` and ``WORSE``.

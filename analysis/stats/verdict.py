@@ -26,7 +26,8 @@ from typing import Any
 import pandas as pd
 
 from dess.analysis.metrics import Metric, metric_of
-from dess.analysis.stats.intervals import LEVEL, Interval
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import LEVEL
 
 ABOVE, INCONCLUSIVE, BELOW = "above", "inconclusive", "below"
 SEEN_ABOVE, SEEN_BELOW = "above in what was seen", "below in what was seen"

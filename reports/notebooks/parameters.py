@@ -32,7 +32,7 @@ from dess.analysis.answers.settings.sobol import (
 )
 from dess.analysis.answers.summary import plot_performance
 from dess.analysis.paper import scorecard, values
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.reports.pages import html
 
 # %%

@@ -26,13 +26,9 @@ from dess.analysis.metrics import (
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
-from dess.analysis.stats.intervals import (
-    Interval,
-    by_replication,
-    column_intervals,
-    level_after,
-    stratified_interval,
-)
+from dess.analysis.stats.intervals import Interval, column_intervals, stratified_interval
+from dess.analysis.stats.kinds import level_after
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 

@@ -18,9 +18,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import (
-    LEVEL,
-)
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, Table, stack_by_policy
 

@@ -11,7 +11,7 @@ from dess.analysis.answers import main_effects
 from dess.analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import adjust_p_values, compare_pairs
-from dess.analysis.stats.intervals import by_replication
+from dess.analysis.stats.weights import by_replication
 from tests.analysis.small import grid
 
 

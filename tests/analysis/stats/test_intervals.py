@@ -24,23 +24,21 @@ from dess.analysis.metrics import (
     metric_in_missions,
     metric_of,
 )
+from dess.analysis.stats.bootstrap import bootstrap_interval, expanded_level
 from dess.analysis.stats.differences import compare
+from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (
     Moments,
-    bootstrap_interval,
     bounded_interval,
-    by_replication,
     column_intervals,
-    expanded_level,
     interval_of,
     mean_interval,
-    post_stratified,
     share_interval,
-    skewness_of,
     stratified_interval,
-    summary,
-    worst_of_nodes,
 )
+from dess.analysis.stats.kinds import skewness_of
+from dess.analysis.stats.weights import by_replication, post_stratified
+from dess.analysis.stats.worst_node import moments_of_worst_node, worst_of_nodes
 from dess.scenario.scenario import ScenarioSpace
 
 SAMPLES = st.lists(st.floats(0, 1), min_size=1, max_size=60)
@@ -382,7 +380,7 @@ def test_the_ends_are_those_of_all_nodes_together():
     assert found.low == pytest.approx(ends[1].low, abs=0.04)
     assert found.high >= ends[0].high
     of_nodes = [Moments.of(of_node) for of_node in values.T]
-    assert Moments.of_worst_node(of_nodes, metric).interval(metric) == pytest.approx(found)
+    assert moments_of_worst_node(of_nodes, metric).interval(metric) == pytest.approx(found)
 
 
 def test_means_of_missions_are_those_of_the_node_that_is_worst_over_all():
