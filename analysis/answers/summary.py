@@ -313,6 +313,28 @@ def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
     return [policy for policy in ranked if policy in learned], heuristics or others
 
 
+def leading_policies(
+    results: Results, learned: str | None = None, heuristic: str | None = None
+) -> list[str]:
+    """The best learned policy of a study, if it has one, and its best heuristic.
+
+    Args:
+        results: The study.
+        learned: The learned policy to take instead of the best one.
+        heuristic: The heuristic to take instead of the best one.
+
+    Raises:
+        InputError: If the study lacks a policy that is named.
+    """
+    for name in (learned, heuristic):
+        if name is not None:
+            results.check_policy(name)
+    all_learned, others = rank_learned_and_others(results)
+    learned = learned or next(iter(all_learned), None)
+    heuristic = heuristic or next(iter(others), None)
+    return [policy for policy in (learned, heuristic) if policy]
+
+
 def worst_missions(
     results: Results,
     policy: str,
