@@ -49,15 +49,15 @@ from dess.base.files.writing import toml_value
 from dess.model.record import Records, empty_records, measures_of
 from dess.policies.heuristics import KINDS
 from dess.policies.registry import load
-from dess.reports.pages.html import (
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.page import PANEL, hidden_element
+from dess.reports.pages.templates import (
     PANEL_SCRIPT,
     SINGLE_SCRIPT,
     pack,
     panel_script,
     render_part,
-    write_markdown,
 )
-from dess.reports.pages.page import PANEL, hidden_element
 from dess.scenario.data_sheet import Units
 from dess.scenario.fields import dotted, is_number
 from dess.scenario.quantities import measured, printed, times

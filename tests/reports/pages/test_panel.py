@@ -36,7 +36,6 @@ from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import index
 from dess.reports.pages import panel as panels
-from dess.reports.pages.html import fill_page
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import (
@@ -47,6 +46,7 @@ from dess.reports.pages.panel import (
     make_another,
     make_panel,
 )
+from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
