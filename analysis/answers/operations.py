@@ -39,8 +39,7 @@ from dess.analysis.stats.verdict import (
     INCONCLUSIVE,
     SEEN_ABOVE,
     SEEN_BELOW,
-    position_of,
-    position_with_allowance,
+    judge_intervals,
 )
 from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import WIDER, allowance_sentence
@@ -305,7 +304,7 @@ def age_sentence(results: Results) -> str:
 def _judge_change(change: Any) -> str:
     """The verdict on a row of ``changes_from_reference``."""
     seen = Interval(change.mean, change.mean - change.student, change.mean + change.student)
-    return position_with_allowance(position_of(change), position_of(seen))
+    return judge_intervals(change, seen)
 
 
 def published_age_in_words() -> str:

@@ -143,6 +143,11 @@ def position_with_allowance(whole: str, without: str) -> str:
     return whole
 
 
+def judge_intervals(whole: Interval, seen: Interval) -> str:
+    """The verdict on a difference by its interval with the allowance for failures and without."""
+    return position_with_allowance(position_of(whole), position_of(seen))
+
+
 def judge_difference(row: Any) -> str:
     """The verdict on a paired difference by its intervals with the allowance and without.
 
