@@ -4,7 +4,7 @@ It shows the estimates of ``answers.summary.means_of_points`` for one design poi
 can contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
 setting at which the sliders start.
 
-    explorer(load_results("results/explorer"))
+    make_explorer(load_results("results/explorer"))
 """
 
 import json

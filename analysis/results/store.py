@@ -603,7 +603,7 @@ def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
 
     Args:
         parts: The parts.
-        stacked: The rows of these missions, and of others, as ``stacked`` returns them.
+        stacked: The rows of these missions, and of others, as ``stack_tables`` returns them.
     """
     lengths = [len(part.replications) for part in parts]
     keys = pd.DataFrame(

@@ -1,6 +1,6 @@
 """Places of users in files: rows of CSV files, and features of GeoJSON, with their projection.
 
-    read_places(Path("buoys.csv"))       # the places of a file, degrees or cells
+    read_table(Path("buoys.csv"))        # the places of a file, degrees or cells
 
 Columns of CSV files are known by their names, whatever the case (``COLUMNS``). Degrees are
 projected about the centre of the grid (equirectangular projection).
