@@ -105,7 +105,7 @@ def may_be_best(
     Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
     that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research).
     After a search, whose numbers of missions depend on their results, each pair is tested at the
-    error of its look (``intervals.level_after``).
+    error of its look (``kinds.level_after``).
 
     Args:
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a

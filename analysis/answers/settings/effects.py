@@ -127,7 +127,7 @@ def means_by_field(results: Results) -> pd.DataFrame:
         for metric in metrics_in(results.missions)
     ]
     columns = ["field", "value", "position", "policy", "metric", "mean", "low", "high", "n"]
-    return pd.concat(tables, ignore_index=True)[columns]
+    return pd.concat(tables, ignore_index=True).reindex(columns=columns)
 
 
 def fields_by_influence(effects: pd.DataFrame) -> list[str]:
