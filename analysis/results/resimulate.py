@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import ADDED, NODE_AGES, NODE_RATIOS, format_length, without_nodes
+from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS, format_length, without_nodes
 from dess.analysis.results.event_log import causes_of_failure
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
@@ -35,7 +35,7 @@ from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
 @dataclass(frozen=True, eq=False)
-class Mission:
+class LoggedMission:
     """A mission with its event log, of a study or of any scenario.
 
     Attributes:
@@ -108,7 +108,7 @@ class Mission:
 
 def mission_of(
     space: ScenarioSpace, team: Sequence[Policy], seed: int = 0, replication: int = 0
-) -> Mission:
+) -> LoggedMission:
     """Simulate a mission of any scenario, with its event log.
 
     Raises:
@@ -119,10 +119,10 @@ def mission_of(
     scenario = sample_scenario(space, seed, replication)
     names = (policy.name for policy in team)
     events = pd.DataFrame(record.events.columns())
-    return Mission(",".join(names), scenario, record, _uavs_of(record), events)
+    return LoggedMission(",".join(names), scenario, record, _uavs_of(record), events)
 
 
-def resimulate(results: Results, policy: str, point: int, replication: int) -> Mission:
+def resimulate(results: Results, policy: str, point: int, replication: int) -> LoggedMission:
     """Simulate a mission of a study again, with the SimPy engine.
 
     Raises:
@@ -248,7 +248,7 @@ class Evidence(Origin):
         for mission in self.sample:
             if mission.policy not in policies:
                 raise ValueError(f"sample: {mission.policy} is not a policy of the study")
-            names = [name for name in MISSION_RECORD.names or () if name not in ADDED]
+            names = [name for name in MISSION_RECORD.names or () if name != HOME]
             if missing := [name for name in names if name not in mission.record]:
                 raise ValueError(f"sample: a record has no {missing[0]}")
         return self

@@ -11,7 +11,7 @@ import scipy
 from scipy.special import stdtr
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, metric_in_missions, metric_of
+from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_missions, metric_of
 from dess.analysis.stats.intervals import Interval, mean_interval
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.rows import check_columns, check_share, group_rows
@@ -40,7 +40,7 @@ def metrics_by_treatment(
         raise InputError("by", f"{of} is what is compared", "other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
-        if metric in EITHER:
+        if metric in metric_group("operations", in_units=True):
             values = values[missions[metric].notna()]
         if odd := int(len(values) - np.isfinite(values).sum()):
             raise InputError(metric, f"no number in {odd} missions", "finite numbers")
@@ -417,7 +417,7 @@ def relative_change(
 def compare(
     missions: pd.DataFrame,
     baseline: str | int,
-    metrics: Sequence[str] = ALWAYS,
+    metrics: Sequence[str] = (*metric_group("paper", "reward"),),
     by: Sequence[str] = (),
     level: float = LEVEL,
     correction: Correction | None = "holm",

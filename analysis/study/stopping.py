@@ -15,26 +15,19 @@ from pydantic import (
 )
 
 from dess import InputError
-from dess.analysis.metrics import (
-    ALWAYS,
-    MEASURES,
-    NODES_BEHIND,
-    Metric,
-    metric_in_missions,
-    metric_of,
-)
+from dess.analysis.metrics import NODES_BEHIND, Metric, metric_group, metric_in_missions, metric_of
 from dess.analysis.stats.kinds import LEVEL, Sample, ends_of_means, skewness_of
 from dess.analysis.stats.worst_node import worst_and_spread
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
-_METRICS = [*ALWAYS, *MEASURES]
+_TARGETS = metric_group("paper", "reward", "operations")
 
 # For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
 Samples = Sequence[Mapping[str, np.ndarray]]
 
 # The largest number of missions that a rule may ask for.
-MOST = 1_000_000_000
+MOST_MISSIONS = 1_000_000_000
 # No round multiplies the number of missions of a cell by more than this.
 _GROWTH = 2.0
 
@@ -46,12 +39,12 @@ def _check_printable(text: str) -> str:
 
 
 def _check_metric(metric: str) -> str:
-    if metric not in _METRICS:
-        raise unknown_name("", f"{shown(metric)} is unknown", metric, _METRICS)
+    if metric not in _TARGETS:
+        raise unknown_name("", f"{shown(metric)} is unknown", metric, _TARGETS)
     return metric
 
 
-# A metric of missions; those of ``MEASURES`` only where the scenario measures them.
+# A metric of missions; those of operations only where the scenario measures them.
 MetricName = Annotated[str, AfterValidator(_check_metric)]
 # A line of text, such as a name.
 Line = Annotated[str, AfterValidator(_check_printable)]
@@ -173,12 +166,15 @@ class Precision(StrictTable):
     """
 
     first: Integer = Field(
-        30, ge=2, le=MOST, description="missions of a cell before the first check"
+        30, ge=2, le=MOST_MISSIONS, description="missions of a cell before the first check"
     )
     look_ahead: Integer = Field(
-        50, ge=0, le=MOST, description="further missions in which the targets must hold as well"
+        50,
+        ge=0,
+        le=MOST_MISSIONS,
+        description="further missions in which the targets must hold as well",
     )
-    budget: Integer = Field(5000, ge=2, le=MOST, description="missions of a cell at most")
+    budget: Integer = Field(5000, ge=2, le=MOST_MISSIONS, description="missions of a cell at most")
     targets: dict[MetricName, Target] = Field(
         min_length=1, description="metric -> { absolute = ..., relative = ... }"
     )
@@ -270,7 +266,7 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
         InputError: If the scenario does not measure it.
     """
     if metric not in sample:
-        present = [name for name in _METRICS if name in sample]
+        present = [name for name in _TARGETS if name in sample]
         raise InputError(metric, "is not measured by the scenario", listed(present))
     return np.asarray(sample[metric], float)
 

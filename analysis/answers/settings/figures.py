@@ -101,16 +101,16 @@ def plot_curves(
     shared = {"sharex": True, "sharey": True, "squeeze": False}
     values = style.ordered_values(rows[line])
     if of_policies:
-        looks = style.policy_colours(values)
+        styles = style.policy_colours(values)
     else:
-        looks = style.graded_colours(values)
+        styles = style.graded_colours(values)
     heading = None
     if not of_policies:
         heading = field_named(line).label
     height = 2.9 * len(parts) + 0.9
     with style.new_panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
-            style.plot_along(part, looks, metric_of(metric).axis, ax, line)
+            style.plot_along(part, styles, metric_of(metric).axis, ax, line)
             title = ""
             if panel:
                 title = field_named(panel).words(value)
@@ -260,10 +260,10 @@ def draw_main_effects(
     """
     effects = main_effects(results, metric, policy)
     measure = metric_of(metric)
-    looks = style.policy_colours(results.policies, effects["policy"])
+    styles = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
-        style.plot_along(effects[effects["field"] == field], looks, measure.axis, ax)
+        style.plot_along(effects[effects["field"] == field], styles, measure.axis, ax)
 
     drawing = _panel_per_field(fields_by_influence(effects), measure, draw)
     caption = (
@@ -285,12 +285,12 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
     """
     table = rank_settings(results, metric, policy)
     measure = metric_of(metric)
-    looks = style.policy_colours(results.policies, table["policy"])
+    styles = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
         rows = style.place_values(table, field)
         for name, part in rows.groupby("policy", sort=False):
-            colour, marker = looks[str(name)]
+            colour, marker = styles[str(name)]
             ax.scatter(part["position"], part[metric], s=18, alpha=0.7, color=colour, label=name,
                        marker=marker, linewidths=0, rasterized=len(table) > 2000)  # fmt: skip
         ticks = rows.drop_duplicates("position").sort_values("position")
@@ -403,7 +403,7 @@ def plot_effect(
         policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     rows = table[table["field"] == field]
-    looks = style.policy_colours(policies, changes)
+    styles = style.policy_colours(policies, changes)
     first = rows[rows["position"] == 0]
     steps = pd.concat(
         [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
@@ -413,11 +413,11 @@ def plot_effect(
     ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
     with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
         for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
-            style.plot_along(rows[rows["metric"] == metric], looks, "%", ax)
+            style.plot_along(rows[rows["metric"] == metric], styles, "%", ax)
             ax.set(
                 ylabel=fill(name, 16), ylim=style.axis_ends(table[table["metric"] == metric], 0.1)
             )
-        style.plot_along(steps, looks, "points", axes[-1])
+        style.plot_along(steps, styles, "points", axes[-1])
         axes[-1].axhline(0, **style.ZERO)
         title = f"Paired difference from the value at {first['value'].iloc[0]}"
         axes[-1].set(title=title, ylabel="percentage\npoints")
@@ -448,10 +448,10 @@ def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
     """
     rows = table[table["metric"] == PRODUCT]
     fields = [*rows["field"].unique()]
-    looks = style.policy_colours(policies, rows["policy"])
+    styles = style.policy_colours(policies, rows["policy"])
     with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
         for ax, field in zip(axes, fields, strict=True):
-            style.plot_along(rows[rows["field"] == field], looks, "%", ax)
+            style.plot_along(rows[rows["field"] == field], styles, "%", ax)
             ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
             ax.tick_params(axis="x", labelsize=8)
         figure.supylabel(metric_of(PRODUCT).label, fontsize=10)
