@@ -12,6 +12,7 @@ import os
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
 
@@ -38,6 +39,7 @@ from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
+from dess.analysis.sheet import scenario_notes
 from dess.analysis.study.cheapest import Cheapest, Required
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
@@ -82,6 +84,11 @@ class Question:
         The design points are then the baseline and the variation.
         """
         return isinstance(self.study.design, TableDesign)
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """Which nodes no UAV can serve, the highest collection ratio, and zones that are small."""
+        return scenario_notes(self.study.scenarios)
 
     @property
     def file(self) -> Path:

@@ -180,6 +180,8 @@ def _answer_question(
     from dess.analysis.ask.answer import Answer
     from dess.analysis.ask.limits import find_limits
 
+    if dry_run:  # an answer tells them
+        options.print_notes(question.notes)
     answer = Answer(question, _run_question(question, page, out, workers, dry_run, yes))
     if changes := answer.question_around():
         _run_question(changes, page, out, workers, dry_run, yes)
@@ -197,7 +199,6 @@ def _run_question(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
-    options.note_limits(study.scenarios)
     results = run_or_exit(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),

@@ -133,11 +133,9 @@ def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") 
         print_text(f"note: {line}", sys.stderr)
 
 
-def note_limits(spaces: "Iterable[ScenarioSpace]") -> None:
-    """Say on stderr which nodes no UAV can serve, and which zones have no room for all UAVs."""
-    from dess.analysis.sheet import scenario_notes
-
-    for line in scenario_notes(spaces):
+def print_notes(notes: Iterable[str]) -> None:
+    """Print notes on stderr, such as which nodes no UAV can serve."""
+    for line in notes:
         print_text(f"note: {line}", sys.stderr)
 
 
