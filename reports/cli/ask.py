@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
@@ -202,7 +202,7 @@ def _run_question(
     results = run_or_exit(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
-        shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
+        command_line("study", "run", question.file, out=folder),
     )
     options.note_departures(study.policies, study.scenarios)
     return results

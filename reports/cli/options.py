@@ -4,7 +4,6 @@ import ast
 import json
 import math
 import re
-import shlex
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import parse_toml
 from dess.reports.cli.console import print_text
@@ -180,7 +180,7 @@ def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[s
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
             return key, parsed["value"]
     if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
-        many = shlex.join(["dess", "sweep", SET, text])
+        many = command_line("sweep", set=[text])
         raise InputError(option, f"{shown(text)} has several values", f"one, or {many}")
     if allowed == FIELD and value:
         _check_word(key, value, option)
