@@ -12,12 +12,12 @@ from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
 from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import (
-    ALWAYS,
     HOME,
     METRICS,
     PRODUCT,
     RATIO,
     SUCCESS,
+    metric_group,
     metric_in_missions,
     metric_of,
     ranking_column,
@@ -32,16 +32,13 @@ from dess.analysis.stats.differences import (
     insert_adjusted,
 )
 from dess.analysis.stats.distribution import distribution
-from dess.analysis.stats.intervals import (
-    Interval,
-    by_replication,
-    level_after,
-    summary,
-    values_within,
-)
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.learners import compare_learners
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.stats.verdict import MARKS, Verdict, position_of
+from dess.analysis.stats.weights import by_replication, values_within
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
@@ -70,7 +67,7 @@ def means_of_points(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy, design point and metric, as ``dess.analysis.summary`` returns it. After a
-        search, the intervals allow for it (``stats.intervals.level_after``).
+        search, the intervals allow for it (``stats.kinds.level_after``).
     """
     cell = ["policy", "point"]
     looks = {name: results.looks(name) for name in results.policies}
@@ -316,6 +313,28 @@ def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
     return [policy for policy in ranked if policy in learned], heuristics or others
 
 
+def leading_policies(
+    results: Results, learned: str | None = None, heuristic: str | None = None
+) -> list[str]:
+    """The best learned policy of a study, if it has one, and its best heuristic.
+
+    Args:
+        results: The study.
+        learned: The learned policy to take instead of the best one.
+        heuristic: The heuristic to take instead of the best one.
+
+    Raises:
+        InputError: If the study lacks a policy that is named.
+    """
+    for name in (learned, heuristic):
+        if name is not None:
+            results.check_policy(name)
+    all_learned, others = rank_learned_and_others(results)
+    learned = learned or next(iter(all_learned), None)
+    heuristic = heuristic or next(iter(others), None)
+    return [policy for policy in (learned, heuristic) if policy]
+
+
 def worst_missions(
     results: Results,
     policy: str,
@@ -341,7 +360,7 @@ def worst_missions(
     if point is not None:
         of_policy = of_policy[of_policy["point"] == point]
     table = of_policy.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)[:missions]
-    table = table[["policy", "point", "replication", *ALWAYS]]
+    table = table[["policy", "point", "replication", *metric_group("paper", "reward")]]
     keys = zip(table["point"], table["replication"], strict=True)
     folder = folder or results.usual_folder
     return table.assign(command=[results.command(policy, *key, folder) for key in keys])

@@ -25,10 +25,10 @@ from dess.analysis.execution.workers import Here, Pool
 from dess.analysis.metrics import (
     METRICS,
     NODES_BEHIND,
-    RECORDED,
     columns_in_units,
     measured_in,
     metric_in_space,
+    recorded_metrics,
 )
 from dess.analysis.results.chunks import split_into_chunks
 from dess.analysis.results.manifest import Cell, CellPart
@@ -36,6 +36,8 @@ from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import Moments
+from dess.analysis.stats.weights import moments_of_space
+from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
 from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import check_seed, spaces_of
@@ -189,7 +191,7 @@ def of_results(results: Results) -> list[Evaluation]:
     """The evaluations of the teams of a study that has the scenario as its only design point."""
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
-        metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in RECORDED}
+        metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in recorded_metrics()}
         measured = [name for name in OPERATIONS.names or () if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             if name not in NODES_BEHIND:
@@ -236,19 +238,19 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
     over_space: dict[str, Moments] = {}
     by_node: dict[str, list[Moments]] = defaultdict(list)
     for key, by_fleet in moments.items():
-        whole = Moments.of_space([by_fleet.get(n) for n in fleets], missions)
+        whole = moments_of_space([by_fleet.get(n) for n in fleets], missions)
         if isinstance(key, str):
             over_space[key] = whole
         else:
             by_node[key[0]].append(whole)
     for metric, nodes in by_node.items():
-        over_space[metric] = Moments.of_worst_node(nodes, metric_in_space(metric, space))
+        over_space[metric] = moments_of_worst_node(nodes, metric_in_space(metric, space))
     return over_space
 
 
 def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarray]:
     """The values of every metric that some of the missions have measured, in units as well."""
-    values = {metric: records.missions[metric] for metric in RECORDED}
+    values = {metric: records.missions[metric] for metric in recorded_metrics()}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     if space.units:

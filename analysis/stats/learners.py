@@ -13,7 +13,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, Metric, metric_in_missions
+from dess.analysis.metrics import Metric, metric_group, metric_in_missions
 from dess.analysis.stats.differences import (
     Correction,
     add_adjusted,
@@ -23,11 +23,13 @@ from dess.analysis.stats.differences import (
     differences_of,
     match_groups,
     metrics_by_treatment,
+    rare_differences,
     select_table,
     sign_test,
     t_test,
 )
-from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_share
 
 # What a comparison is about: all trainings of the learner, or the only one that there is.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"
@@ -114,7 +116,7 @@ def compare_learners(
     missions: pd.DataFrame,
     learners: Mapping[str, Sequence[str]],
     baseline: str,
-    metrics: Sequence[str] = ALWAYS,
+    metrics: Sequence[str] = (*metric_group("paper", "reward"),),
     by: Sequence[str] = (),
     level: float = LEVEL,
     correction: Correction | None = "holm",

@@ -1,7 +1,6 @@
 """``dess study``: run a study into a results folder; show, compare and bundle results."""
 
 import json
-import shlex
 import sys
 from collections.abc import Iterable
 from datetime import date
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.errors import InputError, unknown_name
 from dess.base.libraries import needs
 from dess.reports.cli import console, options
@@ -118,7 +118,7 @@ def _run_and_summarize(
         ),
     )
     print_summary(results, out, short=True)
-    console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+    console.print_text(f"more: {command_line('study', 'show', out)}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
@@ -281,15 +281,16 @@ def _load_folder(folder: Path, begun: bool = False) -> "Results":
 
 def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     """Metric -> the least mean, or the largest of a metric of which less is better."""
-    from dess.analysis.metrics import ALIASES, MEASURES, METRICS
+    from dess.analysis.metrics import ALIASES, METRICS, metric_group
 
+    operations = metric_group("operations")
     targets = {}
     for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
-        if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
-            names = [*METRICS, *ALIASES, *MEASURES]
+        if (metric := ALIASES.get(name, name)) not in METRICS | operations:
+            names = [*METRICS, *ALIASES, *operations]
             raise unknown_name("--target", f"{name!r} is unknown", name, names)
         is_number = isinstance(share, int | float) and not isinstance(share, bool)
-        if metric in MEASURES and not (is_number and share >= 0):
+        if metric in operations and not (is_number and share >= 0):
             raise InputError(f"--target: {name}", f"{share!r} is not allowed", "0 or more")
         if metric in METRICS and not (is_number and 0 <= share <= 1):
             raise InputError(f"--target: {name}", f"{share!r} is not a share", "0..1")
