@@ -261,7 +261,7 @@ def test_in_wind_a_late_uav_takes_the_cheapest_way_around_a_parked_teammate(seed
     state, chart = placed([parked, {"x": 2, "y": 9, "latch": True}], **sea)
     mission, u = state.missions[0], state.uavs[0, 1]
     moves = move_costs(mission, 1, (16, 16))
-    left = _cheapest(moves, (12, 8), (2, 9), (13, 8)) + int(mission["dearest_slot"])
+    left = _cheapest(moves, (12, 8), (2, 9), (13, 8)) + int(mission["waiting_slot"])
     view = View(state, SimpleNamespace(chart=chart), np.zeros(1, int), np.ones(1, int))
     while u["zone"] < 0 and left > 0:
         u["battery"], u["remainder"] = -(-left // 1000), -left % 1000
@@ -273,7 +273,7 @@ def test_in_wind_a_late_uav_takes_the_cheapest_way_around_a_parked_teammate(seed
         else:
             left -= 1000
         u["zone"] = chart.zones[u["y"], u["x"]]
-    assert left == mission["dearest_slot"]
+    assert left == mission["waiting_slot"]
 
 
 def test_a_uav_stays_in_its_parking_cell_whoever_is_near():
