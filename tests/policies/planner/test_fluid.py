@@ -91,7 +91,7 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs, quota):
     log = record.events.columns()
     for i in range(uavs):
         moves = (log["event"] == "move") & (log["uav"] == i)
-        flown = [(v["x"][i], v["y"][i], v["battery"][i]) for v in policy.crafts[1:]]
+        flown = [(v["x"][i], v["y"][i], v["battery"][i] / 1000) for v in policy.crafts[1:]]
         assert [*zip(log["x"][moves], log["y"][moves], log["value"][moves], strict=True)] == (
             flown[: moves.sum()]
         )
@@ -106,7 +106,7 @@ def test_a_charge_adds_what_the_engines_add_whenever_it_begins(flying_time):
     record = simulate(scenario, policy, 5, 0, events=True)
     assert record.events is not None
     battery = [event.battery for event in record.events if event.event == "move"]
-    assert battery[:60] == [int(craft["battery"][0]) for craft in policy.crafts[1:]]
+    assert battery[:60] == [craft["battery"][0] / 1000 for craft in policy.crafts[1:]]
     assert battery[59] > 40
 
 
@@ -175,7 +175,7 @@ def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set():
     scenario = Scenario.of(**ALONE, **CALM)
     plan = _plan(1, [(2, 2, CHARGE), (4, 2, 0)])
     crafts, _, _ = _flown(first_view(scenario), plan, 28)
-    batteries = [int(craft["battery"][0]) for craft in crafts]
+    batteries = [craft["battery"][0] / 1000 for craft in crafts]
     # 20 slots until C_S = 10, five slots to C_C = 60, and then two cells to the east.
     assert batteries == [*range(30, 9, -1), 20, 30, 40, 50, 60, 59, 58, 57]
     assert [int(craft["x"][0]) for craft in crafts[-4:]] == [2, 3, 4, 4]
