@@ -26,7 +26,8 @@ from dess import load_scenario, policies, simulate
 from dess.analysis.figures import missions, style
 from dess.analysis.results import event_log
 from dess.base.errors import InputError
-from dess.reports.pages import INDEX, html
+from dess.reports.pages import INDEX
+from dess.reports.pages.figures import encode_figure
 from dess.reports.pages.index import TILES
 from dess.reports.pages.page import Page
 
@@ -128,7 +129,7 @@ def _keep_picture(name: str, screenshot: bytes, page: Path) -> None:
 def draw_model() -> Iterator[tuple[str, bytes]]:
     """The pictures of *The model*, by file name; the same code draws the same bytes."""
     for draw in (sea, slot, battery):
-        yield f"{draw.__name__}.svg", html.encode_figure(draw(), "svg")
+        yield f"{draw.__name__}.svg", encode_figure(draw(), "svg")
 
 
 def sea() -> Figure:

@@ -25,8 +25,8 @@ from dess.analysis.results.tables import Results
 from dess.base.files import documents, tables
 from dess.base.files.reading import read_bytes
 from dess.base.files.writing import write_zip
-from dess.reports.pages.html import load_template
 from dess.reports.pages.page import LARGEST, LIMIT, Page
+from dess.reports.pages.templates import load_template
 
 _TABLES = ("missions", "uavs", "events", BOUNDS)
 

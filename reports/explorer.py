@@ -21,7 +21,7 @@ from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.answers.settings.points import points_in_words, values_of_points, varied_values
 from dess.analysis.figures import style
 from dess.analysis.results.tables import Results
-from dess.reports.pages.html import render_part
+from dess.reports.pages.templates import render_part
 
 
 class Grid:

@@ -34,7 +34,8 @@ from dess.analysis.figures.style import node_colours, uav_colours
 from dess.analysis.metrics import DRAWN_UNITS, choose_units, format_length, size_of
 from dess.analysis.numbers import format_count
 from dess.analysis.results import event_log
-from dess.reports.pages.html import Part, load_template, make_figures
+from dess.reports.pages.parts import Part, make_figures
+from dess.reports.pages.templates import load_template
 from dess.scenario.scenario import Scenario
 
 # The events that a player jumps to, in words; of a pad, the text has no number.

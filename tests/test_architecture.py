@@ -32,7 +32,8 @@ ROOMS = {
     ),
     "policies": (
         *("shipped", "network", "adapter", "heuristics", "planner", "learner.config"),
-        *("learner.policy", "learner.trained", "learner.network", "learner.training"),
+        *("learner.policy", "learner.arrays", "learner.trained", "learner.network"),
+        "learner.training",
         *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
         "registry",
     ),

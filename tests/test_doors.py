@@ -37,7 +37,7 @@ ALLOWED = {
     "dess.base.kernels": {"read_bytes"},
     "dess.base.sources": {"read_bytes"},
     # A library that opens a file which the door has checked, or a temporary one of the door.
-    "dess.policies.learner.trained": {"safe_open", "save_file"},
+    "dess.policies.learner.arrays": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},
     "dess.reports.cli.simulate": {"savefig"},
     "dess.reports.player": {"saving"},

@@ -28,10 +28,15 @@ from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
+    BETTER,
     INCONCLUSIVE,
     NOT_RULED_OUT,
     SEEN_ABOVE,
     SEEN_BELOW,
+    SEEN_BETTER,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
     judge_difference,
     position_of,
     position_with_allowance,
@@ -42,10 +47,10 @@ from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 
 _CLAIMS = {
-    ABOVE: "The planner is better",
-    SEEN_ABOVE: f"The planner is better in what was seen; {NOT_RULED_OUT}",
-    BELOW: "The learner is better",
-    SEEN_BELOW: f"The learner is better in what was seen; {NOT_RULED_OUT}",
+    BETTER: "The planner is better",
+    SEEN_BETTER: f"The planner is better in what was seen; {NOT_RULED_OUT}",
+    WORSE: "The learner is better",
+    SEEN_WORSE: f"The learner is better in what was seen; {NOT_RULED_OUT}",
     INCONCLUSIVE: "The missions do not tell which is better",
 }
 
@@ -82,7 +87,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
     points = numbers.format_points(overall.difference, overall.low, overall.high)
-    verdict = judge_difference(overall)
+    verdict = better_or_worse(judge_difference(overall), PRODUCT)
     sentence = (
         f"{_CLAIMS[verdict]}: the product of {planner} minus that of "
         f"{overall.baseline} is {points} points over {overall.n:,} missions."
@@ -90,7 +95,7 @@ def planner_sentences(table: pd.DataFrame, planner: str) -> tuple[str, str]:
     if verdict == INCONCLUSIVE:
         return sentence, ""
     number = f"{numbers.format_difference(overall.difference, 0)} points"
-    if verdict in (SEEN_ABOVE, SEEN_BELOW):
+    if verdict in (SEEN_BETTER, SEEN_WORSE):
         number += " in what was seen"
     return sentence, number
 

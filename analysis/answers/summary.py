@@ -24,6 +24,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.alternatives import ONLY, judge_alternatives
 from dess.analysis.stats.differences import (
     P_VALUES,
     compare,
@@ -39,7 +40,8 @@ from dess.analysis.stats.intervals import (
     values_within,
 )
 from dess.analysis.stats.learners import compare_learners
-from dess.analysis.stats.verdict import MARKS, ONLY, judge_alternatives, position_of
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.verdict import MARKS, Verdict, position_of
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
@@ -91,12 +93,11 @@ def settings_meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.Da
         means: Rows of ``means_of_points``.
         targets: Metric -> the least mean, or the largest of a metric of which less is better.
     """
-    for metric, end in targets.items():
-        if metric_of(metric).less_is_better:
-            met = means["high"] <= end
-        else:
-            met = means["low"] >= end
-        passed = means[(means["metric"] == metric) & met]
+    for metric, bound in targets.items():
+        requirement = Requirement(metric_of(metric), bound)
+        rows = means[means["metric"] == metric]
+        verdicts = map(requirement.judge, rows["low"], rows["high"])
+        passed = rows[[verdict == Verdict.MET for verdict in verdicts]]
         means = means.merge(passed[["policy", "point"]])
     return means
 
@@ -105,7 +106,7 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``means_of_points`` with a ``verdict``: how a policy compares with the others there.
 
     Compared are the policies of the table at the same design point, by each metric, on the
-    replications that they have in common, by ``stats.verdict.judge_alternatives``.
+    replications that they have in common, by ``stats.alternatives.judge_alternatives``.
 
     Args:
         results: The study.

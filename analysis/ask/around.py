@@ -17,8 +17,6 @@ from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import priced_settings, setting_cells
 from dess.analysis.answers.fleet.requirements import (
-    Requirement,
-    Verdict,
     least_spare,
     requirements_of,
 )
@@ -35,6 +33,8 @@ from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.tables import Results, load_results
 from dess.analysis.stats.differences import compare
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.study import study_from
 from dess.analysis.tables import INTERVALS, Table
 from dess.policies.registry import is_path
@@ -210,18 +210,17 @@ def _verdicts_of_search(results: Results) -> dict[ScenarioSpace, Verdict]:
     rows = judge_settings(results)
     rows = rows[rows["policy"] == search_of(results).best.policy]
     return {
-        results.scenario(point): Verdict(verdict)
+        results.scenario(point): verdict
         for point, verdict in zip(rows["point"], rows["verdict"], strict=True)
     }
 
 
 def _verdict_on_row(row: pd.Series, requirements: Sequence[Requirement]) -> Verdict:
     """Whether the intervals of a row keep all requirements."""
-    verdicts = [
-        requirement.verdict(row[f"{requirement.column}_low"], row[f"{requirement.column}_high"])
+    return Verdict.of_all(
+        requirement.judge(row[f"{requirement.column}_low"], row[f"{requirement.column}_high"])
         for requirement in requirements
-    ]
-    return Verdict.of_all(verdicts)
+    )
 
 
 def change_in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:

@@ -20,10 +20,11 @@ from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import compare, differences_of, t_test
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import (
-    BELOW,
     INCONCLUSIVE,
     NOT_RULED_OUT,
-    SEEN_BELOW,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
     judge_difference,
     position_of,
 )
@@ -129,8 +130,8 @@ def _compare_neighbours(results: Results) -> list[Fall]:
     differences = differences.set_index("point")
     falls = []
     for point, change in enumerate(around.list_changes(changed_results), 1):
-        verdict = judge_difference(differences.loc[point])
-        if verdict not in (BELOW, SEEN_BELOW):
+        verdict = better_or_worse(judge_difference(differences.loc[point]), RATIO)
+        if verdict not in (WORSE, SEEN_WORSE):
             continue
         falls.append(
             Fall(
@@ -138,7 +139,7 @@ def _compare_neighbours(results: Results) -> list[Fall]:
                 before=around.change_in_words(space, _change_back(change)),
                 policy=changed_results.policies[0],
                 difference=differences.loc[point],
-                is_certain=verdict == BELOW,
+                is_certain=verdict == WORSE,
                 shares=_measure_shares(changed_results, point),
                 shares_before=_measure_shares(changed_results, 0),
                 nodes=_mean_ratios_of_nodes(changed_results, point),

@@ -29,6 +29,7 @@ from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import values_within, worst_node
+from dess.analysis.stats.verdict import Verdict, judge_margins
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
 from dess.base.files.writing import write_file
@@ -177,12 +178,18 @@ class Trial:
         """The least margin."""
         return min(self.margins.values(), default=-math.inf)
 
+    def judge(self, metric: str) -> Verdict:
+        """Whether the requirement on a metric is met, by the interval of its change."""
+        margin = self.margins[metric]
+        error = self.errors[metric]
+        return judge_margins(margin - error, margin + error)
+
     @property
     def broken(self) -> str:
         """The metric whose requirement breaks most; empty if all are kept."""
         if not self.margins:
             return SHEET
-        if self.room >= 0:
+        if judge_margins(self.room, self.room) == Verdict.MET:
             return ""
         return min(self.margins, key=self.margins.__getitem__)
 
@@ -200,10 +207,10 @@ def _digits_of_limit(trials: Mapping[float, Trial], broken: str) -> int:
     missed = [math.inf]
     for value, trial in trials.items():
         if broken in trial.margins:
-            margin, error = trial.margins[broken], trial.errors[broken]
-            if margin - error >= 0:
+            verdict = trial.judge(broken)
+            if verdict == Verdict.MET:
                 kept.append(value)
-            elif margin + error < 0:
+            elif verdict == Verdict.MISSED:
                 missed.append(value)
     if min(missed) - max(kept) <= 2 * CLOSE * min(missed) < math.inf:
         return 2
@@ -587,7 +594,7 @@ def _find_most_failures(fleet: _Fleet) -> Limit:
     unfailed = fleet.fly_with_failures(_RAREST)
     rate = min(max(1 / max(unfailed.hours.mean(), _RAREST), 2 * least), most)  # one in a mission
     model = FailureModel(unfailed, fleet.fly_with_failures(rate))
-    while rate < most and trial(model, rate).room >= 0:
+    while rate < most and not trial(model, rate).broken:
         rate = min(_MORE_FAILURES * rate, most)
         model = FailureModel(unfailed, fleet.fly_with_failures(rate))
 
@@ -595,7 +602,7 @@ def _find_most_failures(fleet: _Fleet) -> Limit:
     broken = trial(model, rate).broken
     digits = 3
     last = ""
-    if trial(model, least).room < 0:
+    if trial(model, least).broken:
         limit = least
         broken = trial(model, least).broken
         if sheet.mtbf:

@@ -22,6 +22,7 @@ from dess.analysis.metrics import (
     size_of,
 )
 from dess.analysis.names import DECISIONS
+from dess.analysis.stats.verdict import Verdict, judge_facts
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
 from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
@@ -30,9 +31,6 @@ from dess.physics.section import Integer, Number
 from dess.scenario.fields import is_number
 from dess.scenario.quantities import quantity_of
 from dess.scenario.scenario import ScenarioSpace
-
-Verdict = Literal["met", "missed", "open"]
-_MOST_SERIOUS_FIRST = ("missed", "open", "met")
 
 # The largest stake, as a share of the stake with which a single value could lose everything.
 _BOLDEST = 0.999
@@ -65,21 +63,23 @@ class MeanTest:
         self._at_least = _Wealth(1 - most, tolerance)
         self._target_of_met = -np.log(error)
         self._target_of_missed = -np.log(error_of_miss or error)
-        self.verdict: Verdict = "open"
+        self.verdict = Verdict.OPEN
         self.missions = 0
+        self._total = 0.0
 
     def observe(self, values: np.ndarray) -> None:
         """Take more values into account, in the order of their replications."""
-        if self.verdict != "open" or not len(values):
+        if self.verdict != Verdict.OPEN or not len(values):
             return
         met = _first_true(self._at_most.after(values) >= self._target_of_met)
         missed = _first_true(self._at_least.after(1 - values) >= self._target_of_missed)
-        if min(met, missed) < len(values):
-            if met < missed:
-                self.verdict = "met"
-            else:
-                self.verdict = "missed"
-        self.missions += min(met + 1, missed + 1, len(values))
+        first = min(met, missed)
+        seen = values[: first + 1]
+        self._total += float(seen.sum())
+        self.missions += len(seen)
+        if first < len(values):
+            margin = self._total / self.missions - self.required
+            self.verdict = judge_facts(met == first, missed == first, margin)
 
 
 class WorstNodeTest:
@@ -96,14 +96,14 @@ class WorstNodeTest:
 
     def __init__(self, required: float, tolerance: float, error: float):
         self.required = required
-        self.verdict: Verdict = "open"
+        self.verdict = Verdict.OPEN
         self.missions = 0
         self._limits = tolerance, error
         self._tests: list[MeanTest] = []
 
     def observe(self, values: np.ndarray) -> None:
         """Take more (n, K) values of K nodes into account, in the order of their replications."""
-        if self.verdict != "open" or not len(values):
+        if self.verdict != Verdict.OPEN or not len(values):
             return
         nodes = values.shape[1]
         tolerance, error = self._limits
@@ -113,8 +113,7 @@ class WorstNodeTest:
         for test, of_node in zip(self._tests, values.T, strict=True):
             test.observe(of_node)
         self.missions += len(values)
-        verdicts = {test.verdict for test in self._tests}
-        self.verdict = min(verdicts, key=_MOST_SERIOUS_FIRST.index)
+        self.verdict = Verdict.of_all(test.verdict for test in self._tests)
 
 
 class _Wealth:
@@ -207,10 +206,10 @@ class CheapestQuestion:
             indifference: The smallest saving that matters, in the currency.
         """
         verdicts = points.verdicts[self.candidates]
-        possible = ~(verdicts == "missed").any(axis=1)
+        possible = ~(verdicts == Verdict.MISSED).any(axis=1)
         self.candidates = self.candidates[possible]
         self._best = None
-        feasible = (verdicts[possible] == "met").all(axis=1)
+        feasible = (verdicts[possible] == Verdict.MET).all(axis=1)
         if not feasible.any():
             self.settled = not len(self.candidates)
             self._next = self._up_to_promising(points, indifference)
@@ -575,7 +574,7 @@ class _Points:
     def __init__(self, k: int, first: int):
         self.counts = np.full(k, first)
         self.looks = np.ones(k, int)
-        self.verdicts = np.full(k, "open", object)
+        self.verdicts = np.full(k, Verdict.OPEN, object)
         self.promising = np.zeros(k, bool)
         self.costs = np.zeros(k)
 
@@ -671,5 +670,5 @@ class _Search:
             shares = as_share(metric, values, horizon)
             test.observe(shares[test.missions :])
             points.promising[point] &= shares.mean(axis=0).min() >= test.required
-        verdicts = {test.verdict for test in self._tests[point].values()}
-        points.verdicts[point] = min(verdicts, key=_MOST_SERIOUS_FIRST.index)
+        tests = self._tests[point].values()
+        points.verdicts[point] = Verdict.of_all(test.verdict for test in tests)

@@ -6,5 +6,6 @@ replay memory, ``ppo`` the training for any sea (proximal policy optimization), 
 training in a folder, and ``policy`` is the trained policy.
 
 Files may come from anybody and are checked when they are read: ``checkpoint`` is a training that
-can go on, ``trained`` the folder of a policy, whose ``config.json`` is in ``config`` as well.
+can go on, ``trained`` the folder of a policy, whose ``config.json`` is in ``config`` as well;
+``arrays`` has the files of both.
 """

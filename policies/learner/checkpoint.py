@@ -20,19 +20,22 @@ from dess.base.files.reading import parse_json
 from dess.envs.observations import states as column
 from dess.model.record import MISSION_RECORD
 from dess.model.state import ACTION_NAMES, END_NAMES, State, constants_of, types_of
-from dess.policies.learner import trained
-from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
-from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.network import to_arrays, to_tensors
-from dess.policies.learner.ppo import ProximalTraining
-from dess.policies.learner.trained import (
+from dess.policies.learner.arrays import (
     Arrays,
     array_without_memory,
     arrays_under,
     from_bytes,
-    require_version,
+    hash_arrays,
+    read_arrays,
+    require_same_forms,
     to_bytes,
+    write_arrays,
 )
+from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
+from dess.policies.learner.dqn import DQNTraining
+from dess.policies.learner.network import to_arrays, to_tensors
+from dess.policies.learner.ppo import ProximalTraining
+from dess.policies.learner.trained import require_version
 from dess.policies.learner.training import METRICS, Training
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import ScenarioSpace
@@ -130,8 +133,8 @@ def save_training(path: Path, training: Training) -> None:
         header["stepper"] = [training.stepper.seed, training.stepper.replication]
         if training.config.checkpoint_replay:
             header["replay"] = training.replay.count
-    header["sha256"] = trained.hash_arrays(header, values)
-    trained.write_arrays(path, values, {"dess": json.dumps(header)})
+    header["sha256"] = hash_arrays(header, values)
+    write_arrays(path, values, {"dess": json.dumps(header)})
 
 
 def load_training(
@@ -152,7 +155,7 @@ def load_training(
     """
     if limit is None:
         limit = 2**36
-    values, metadata = trained.read_arrays(path, HEADER_LIMIT + limit)
+    values, metadata = read_arrays(path, HEADER_LIMIT + limit)
     if "dess" not in metadata:
         raise InputError(path, "no checkpoint of a training", f"{CHECKPOINT} of one")
     header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
@@ -165,17 +168,14 @@ def load_training(
             path, f"of another config ({', '.join(different)} differ)", "the one it began with"
         )
     require_version(header.observation_version, training.observation, path)
-    if (
-        trained.hash_arrays({k: v for k, v in raw.items() if k != "sha256"}, values)
-        != header.sha256
-    ):
+    if hash_arrays({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
         raise InputError(path, "damaged: its content has not the checksum of its header", _WHOLE)
     try:
         training.enter_phase(header.progress.phase_index)
         for name, value in raw["progress"].items():
             setattr(training, name, value)
         finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
-        trained.require_same_forms(values, _expected_arrays(training, finished), str(path))
+        require_same_forms(values, _expected_arrays(training, finished), str(path))
         _restore_training(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
         problem = str(error)

@@ -19,15 +19,11 @@ from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates, compact_states
 from dess.envs.stepper import MissionStepper
 from dess.model.batch import simulate_batch
+from dess.policies.learner.arrays import require_weights
 from dess.policies.learner.config import Phase, TrainingConfig, field_ranges
 from dess.policies.learner.network import make_network, to_arrays, to_tensors
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.trained import (
-    expected_weights,
-    make_observation,
-    make_policy,
-    require_weights,
-)
+from dess.policies.learner.trained import expected_weights, make_observation, make_policy
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 

@@ -418,7 +418,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.base.files import writing
     from dess.reports import player
-    from dess.reports.pages.html import fill_page
+    from dess.reports.pages.templates import fill_page
 
     caption = player.explain_player(mission.scenario)
     shown = player.Shown(mission.log, mission.scenario)

@@ -52,7 +52,10 @@ from dess.analysis.answers.policies.parameter_bins import (
     differences_along_parameters,
     draw_differences_along_parameters,
 )
-from dess.reports.pages import html
+from dess.reports.pages.markdown import command_block, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/comparison")
@@ -64,10 +67,10 @@ worst = worst_pair_missions(missions, 5)
 lost = most_lost(missions.drop(worst.index), 5)
 
 # %%
-html.make_answer(pair_sentence(comparison, missions, pair))
+make_answer(pair_sentence(comparison, missions, pair))
 
 # %%
-html.lead_figure(*draw_difference_distribution(missions, pair))
+lead_figure(*draw_difference_distribution(missions, pair))
 
 # %% [markdown]
 # ## Why: where it is better
@@ -76,11 +79,11 @@ html.lead_figure(*draw_difference_distribution(missions, pair))
 
 # %%
 lead = differences_along_parameters(missions, pair.candidates)
-html.write_markdown("{colours}", colours=colours_in_words(lead, pair))
+write_markdown("{colours}", colours=colours_in_words(lead, pair))
 
 # %%
-too_few = html.write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
-html.show_parts(
+too_few = write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
+show_parts(
     draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, 95 % intervals, ")
     or too_few
 )
@@ -92,7 +95,7 @@ html.show_parts(
 
 # %%
 kept = logged.kept_missions(study, missions_to_draw(missions, pair), results)
-html.make_gallery(
+make_gallery(
     logged.draw_mission(
         mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption
     )
@@ -116,8 +119,8 @@ for caption, rows in found.items():
     if len(rows):
         shown = tables.comparison_cells(rows, rows.columns[0])
         of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
-        display(html.make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
-html.write_markdown(
+        display(make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
+write_markdown(
     "{correction} {why} {weights}",
     correction=summary.correction_in_words(study),
     why=summary.allowance_for_difference(comparison, "policy"),
@@ -129,37 +132,37 @@ html.write_markdown(
 
 # %%
 depleted = count_depleted_uavs(study, pair.policy, worst["replication"])
-html.make_table(pair_outcome_table(missions, pair), "Outcomes of the missions")
+make_table(pair_outcome_table(missions, pair), "Outcomes of the missions")
 
 # %%
-html.make_table(
+make_table(
     dependence_table(lead, dependence_on_parameters(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
 
 # %%
-html.make_table(
+make_table(
     outcome_table(worst, study, pair),
     f"The worst missions of {pair.policy}; {depleted} of its UAVs run out of battery in these",
 )
 
 # %%
-html.make_table(outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
+make_table(outcome_table(lost, study, pair), f"The greatest losses to {pair.baseline}")
 
 # %%
-html.make_table(time_table(times), "Time of a decision for the UAVs of a mission")
+make_table(time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
 lines = mission_commands(study, pair.policy, [*worst["replication"], *lost["replication"]])
-html.write_markdown(
+write_markdown(
     "{times} These commands simulate missions of the tables again:\n\n{lines}",
     times=decision_time_sentences(times, study, pair),
-    lines=html.command_block(lines),
+    lines=command_block(lines),
 )
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

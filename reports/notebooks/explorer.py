@@ -24,7 +24,10 @@ from dess.analysis import load_results, numbers
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.answers.settings.points import points_in_words
 from dess.reports.explorer import Grid, make_explorer
-from dess.reports.pages import html
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import make_answer
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(Path(results) / "explorer")
@@ -32,7 +35,7 @@ grid = Grid(study)
 start = grid.at_start()
 
 # %%
-html.make_answer(grid.describe_start())
+make_answer(grid.describe_start())
 
 # %%
 make_explorer(study)
@@ -41,7 +44,7 @@ make_explorer(study)
 # ## How far to trust it
 
 # %%
-html.write_markdown(
+write_markdown(
     "A dot is a mean over n = {missions} missions, its bar the 95 % interval. All settings have "
     "the same random draws, so two settings may differ although their intervals overlap; a "
     "[what-if question](what-if.html) compares them mission by mission.",
@@ -49,7 +52,7 @@ html.write_markdown(
 )
 
 # %%
-html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
+write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %% [markdown]
 # ## The setting at which the sliders start
@@ -60,7 +63,7 @@ table = (
     .rename(columns=grid.metrics)
     .reset_index(names="Policy")
 )
-html.make_table(
+make_table(
     table,
     f"With {points_in_words(study)[grid.start]}; the CSV file has all settings",
     data=grid.means_table(),
@@ -70,7 +73,7 @@ html.make_table(
 # ## How this page was made
 
 # %%
-html.write_markdown(
+write_markdown(
     "All other fields are those of the scenario {name}, such as {nodes} sensor nodes, {grid} x "
     "{grid} cells and a quota of {quota:,} communication slots.",
     name=study.manifest["study"]["scenario"],
@@ -80,4 +83,4 @@ html.write_markdown(
 )
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

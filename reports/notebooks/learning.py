@@ -47,7 +47,10 @@ from dess.analysis.answers.training.variants import (
 )
 from dess.analysis.paper import measures, scorecard, values
 from dess.policies.registry import TRAINED
-from dess.reports.pages import html
+from dess.reports.pages.markdown import command_block, escape_sentences, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_figure, make_gallery
+from dess.reports.pages.provenance import weights_table
+from dess.reports.pages.tables import make_table
 
 # %%
 folder = Path(str(trained or TRAINED))
@@ -58,10 +61,10 @@ rungs = rows_of_ladder(last)
 equal = of_equal_budget(last, baseline)
 
 # %%
-html.make_answer(methods_sentence(rungs))
+make_answer(methods_sentence(rungs))
 
 # %%
-html.lead_figure(*draw_method_ladder(rungs))
+lead_figure(*draw_method_ladder(rungs))
 
 # %% [markdown]
 # ## Why: the effect of each method
@@ -74,7 +77,7 @@ html.lead_figure(*draw_method_ladder(rungs))
 
 # %%
 table = compare_variants(equal, baseline)
-html.make_figure(*draw_variants(table, equal, baseline, "The product that every variant reaches"))
+make_figure(*draw_variants(table, equal, baseline, "The product that every variant reaches"))
 
 # %% [markdown]
 # What a method adds depends on the methods that are there before it.
@@ -84,7 +87,7 @@ html.make_figure(*draw_variants(table, equal, baseline, "The product that every 
 # our methods.
 
 # %%
-html.write_markdown("{text}", text=without_each(last))
+write_markdown("{text}", text=without_each(last))
 
 # %% [markdown]
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
@@ -98,19 +101,19 @@ lines = [
     f"{learning_to_charge(last, without)} without"
     for name, (using, without) in pairs_in(trainings).items()
 ]
-html.write_markdown(
-    "Trainings that learn to charge:\n\n{lines}", lines=html.escape_sentences("\n".join(lines))
+write_markdown(
+    "Trainings that learn to charge:\n\n{lines}", lines=escape_sentences("\n".join(lines))
 )
 
 # %%
-html.make_gallery(transfer_drawings(trainings), TRAININGS)
+make_gallery(transfer_drawings(trainings), TRAININGS)
 
 # %% [markdown]
 # ## The shipped policies
 
 # %%
 shipped = trained_policies(folder)
-html.make_gallery(shipped_drawings(shipped), TRAININGS)
+make_gallery(shipped_drawings(shipped), TRAININGS)
 
 # %% [markdown]
 # ## How far to trust it
@@ -128,7 +131,7 @@ best = last.groupby("variant")[FINAL].max().map(numbers.format_percent)
 pair, variants = [*pairs_in(trainings).items()][-1]
 
 # %%
-html.write_markdown(
+write_markdown(
     "The longest of these pairs have {steps:,} steps; in the paper the curves cross at {paper:,}, "
     "and shorter trainings are inconclusive. With {name}, the best training with transfer reaches "
     "a product of {ends[0]}, the best without {ends[1]}.",
@@ -142,7 +145,7 @@ html.write_markdown(
 # ## Tables
 
 # %%
-html.make_table(
+make_table(
     ablation_table(table, equal, baseline),
     "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
     "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive, by the "
@@ -152,7 +155,7 @@ html.make_table(
 
 # %%
 compared = transfer_table(transfers, verdicts)
-html.make_table(
+make_table(
     compared,
     "With transfer against without: the last difference with its 99 % interval (of the product "
     "in points)",
@@ -163,9 +166,9 @@ html.make_table(
 # ## How this page was made
 
 # %%
-html.write_markdown(
+write_markdown(
     "Where the moving average of the product ends, and from when on it is near:\n\n{courses}",
-    courses=html.escape_sentences(
+    courses=escape_sentences(
         "\n".join(course_in_words(policy, measures.MARGIN) for policy in shipped)
     ),
 )
@@ -175,7 +178,7 @@ html.write_markdown(
 
 # %%
 again = "python -m benchmarks.learning_curves --out runs/learning"
-html.write_markdown("{lines}", lines=html.command_block([again, *training_commands(shipped)]))
+write_markdown("{lines}", lines=command_block([again, *training_commands(shipped)]))
 
 # %%
-html.weights_table(folder)
+weights_table(folder)

@@ -28,8 +28,11 @@ from dess.analysis.answers import missions, summary
 from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import Mission
-from dess.reports.pages import html
+from dess.reports.pages.markdown import command_block, write_markdown
 from dess.reports.pages.panel import make_another
+from dess.reports.pages.parts import Part, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 from dess.reports.player import READING, Shown, join_players, make_player, player_script
 
 # %%
@@ -45,7 +48,7 @@ shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
 example = Mission.of(fig1, best, 0, replication)
 
 # %%
-html.make_answer(missions.shared_collection_sentence(shown))
+make_answer(missions.shared_collection_sentence(shown))
 
 # %%
 player_script()
@@ -59,7 +62,7 @@ def told(mission: Mission) -> Shown:
     return Shown(mission.events, mission.scenario, title, choice)
 
 
-def played(mission: Mission, name: str) -> html.Part:
+def played(mission: Mission, name: str) -> Part:
     caption = (
         f"n = 1 mission of {mission.policy}, replication {replication} of seed {seed}, "
         f"{mission.record.slots} mission slots. {mission.causes}"
@@ -81,7 +84,7 @@ make_player([told(shown[-1]), *map(told, choices)], "player", caption)
 # ## How to read it
 
 # %%
-html.write_markdown("{reading}", reading=READING)
+write_markdown("{reading}", reading=READING)
 
 # %% [markdown]
 # On the maps, an arrow is a move in one slot, in the colour of the node that was served most, or
@@ -118,7 +121,7 @@ display(*(played(mission, f"player-{mission.scenario.uavs}") for mission in show
 # The missions have the same initial data, arrivals and shadowing; only the number of UAVs differs.
 
 # %%
-html.make_gallery(
+make_gallery(
     missions.beside_paper(fig4, mission, values.FIG_4[mission.scenario.uavs][RATIO])
     for mission in shown
 )
@@ -135,7 +138,7 @@ caption = (
     f"{example.record.slots} mission slots, {example.collected}. {example.causes}"
 )
 alt = "Map of the mission; battery, residual data and charging"
-html.make_gallery([missions.draw_mission(example, alt, caption)])
+make_gallery([missions.draw_mission(example, alt, caption)])
 
 # %% [markdown]
 # ## How far to trust it
@@ -146,7 +149,7 @@ html.make_gallery([missions.draw_mission(example, alt, caption)])
 # ## Tables
 
 # %%
-html.make_table(missions.outcome_table(shown), "The missions; data in data units")
+make_table(missions.outcome_table(shown), "The missions; data in data units")
 
 # %% [markdown]
 # ## How this page was made
@@ -158,9 +161,7 @@ command = (
     f"dess simulate --scenario {fig4.manifest['study']['scenario']} --set uavs={{}} "
     f"--policy {shown_policy} --seed {seed} --replication {replication}"
 )
-html.write_markdown(
-    "{commands}", commands=html.command_block(command.format(m.scenario.uavs) for m in shown)
-)
+write_markdown("{commands}", commands=command_block(command.format(m.scenario.uavs) for m in shown))
 
 # %%
-html.provenance_table([fig1, fig4])
+provenance_table([fig1, fig4])

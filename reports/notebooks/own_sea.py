@@ -45,7 +45,11 @@ from dess.analysis.ask.limits import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
-from dess.reports.pages import html, study
+from dess.reports.pages import study
+from dess.reports.pages.markdown import command_block, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.templates import render_part
 
 # %%
 sea = load_scenario(scenario)
@@ -61,16 +65,16 @@ if asked := around.question_around(found, scenario):
     asked.ask(workers, yes=yes)
     find_limits(found, scenario, workers)
 search = search_of(found)
-html.make_answer(search.sentence(), search.best.fleet)
+make_answer(search.sentence(), search.best.fleet)
 
 # %%
-html.lead_figure(*draw_cheapest(found))
+lead_figure(*draw_cheapest(found))
 
 # %%
 if sea.units:
-    html.show_parts(
+    show_parts(
         study.draw_typical_mission(found),
-        html.render_part("brief.html", lines=brief_sentences(found)),
+        render_part("brief.html", lines=brief_sentences(found)),
     )
 
 # %%
@@ -79,15 +83,15 @@ shown = found.scenario(point)
 study.make_panel_of(found)
 
 # %%
-html.render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
+render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.show_parts(
+show_parts(
     fleet_tables.fleet_table(found),
-    html.write_markdown("{reasons}", reasons=study.list_reasons(found)),
+    write_markdown("{reasons}", reasons=study.list_reasons(found)),
 )
 
 # %%
@@ -97,7 +101,7 @@ about_mission = map_caption(mission, fleets_in_words(found)[point])
 
 # %%
 about_sea = f"The n = {len(sea.nodes)} nodes and the zone.{node_placing_sentence(sea)}"
-html.make_gallery(
+make_gallery(
     [
         (sea_figure(sea), "Map of the sea", about_sea),
         (map_of_mission, "Map of a mission of the answer", about_mission),
@@ -106,7 +110,7 @@ html.make_gallery(
 
 # %%
 if around.is_known(found):
-    html.show_parts(around.table_around(found), draw_falls(found))
+    show_parts(around.table_around(found), draw_falls(found))
 
 # %% [markdown]
 # ## How far to trust it
@@ -114,19 +118,19 @@ if around.is_known(found):
 # The check had no part in the search, so its means are unbiased.
 
 # %%
-no_check = html.write_markdown("No fleet was checked.")
-html.show_parts(no_check if found.checks.empty else fleet_tables.check_table(found))
+no_check = write_markdown("No fleet was checked.")
+show_parts(no_check if found.checks.empty else fleet_tables.check_table(found))
 
 # %% [markdown]
 # ## Tables
 
 # %%
 if has_conditions(found):
-    html.show_parts(fleet_tables.condition_table(found))
-html.show_parts(cost_parts_table(found))
+    show_parts(fleet_tables.condition_table(found))
+show_parts(cost_parts_table(found))
 
 # %%
-html.show_parts(
+show_parts(
     summary.worst_missions_table(
         found, summary.worst_missions(found, search.best.policy, point=point)
     )
@@ -149,16 +153,16 @@ html.show_parts(
 # This command runs the same sweep and makes a page with more details:
 
 # %%
-html.write_markdown("{lines}", lines=html.command_block([answer.question.command]))
+write_markdown("{lines}", lines=command_block([answer.question.command]))
 
 # %%
-html.render_part("left_out.html") if sea.units else None
+render_part("left_out.html") if sea.units else None
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.write_markdown(
+write_markdown(
     "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
     "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions.",
     nodes=len(sea.nodes),
@@ -171,4 +175,4 @@ html.write_markdown(
 )
 
 # %%
-html.provenance_table([found])
+provenance_table([found])

@@ -33,7 +33,10 @@ from dess.analysis.answers.settings.sobol import (
 from dess.analysis.answers.summary import plot_performance
 from dess.analysis.paper import scorecard, values
 from dess.analysis.stats.intervals import LEVEL
-from dess.reports.pages import html
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 folder = Path(results)
@@ -49,11 +52,11 @@ checks = summary.means_of_check(sweet)
 paper = values.printed_intervals(sweet, "sweet-spot")
 
 # %%
-html.make_answer(main_effects.strongest_fields_sentence(effects, policies, changes))
+make_answer(main_effects.strongest_fields_sentence(effects, policies, changes))
 
 # %%
 most = effects[effects["field"].isin(main_effects.strongest_fields(effects, leading))]
-html.lead_figure(
+lead_figure(
     plot_one_by_one(effects, fig5.policies),
     "The product against every parameter",
     f"n = {numbers.format_span(effects['n'])} missions per dot, with all other parameters drawn "
@@ -69,7 +72,7 @@ html.lead_figure(
 # They have an axis of their own.
 
 # %%
-html.make_gallery(
+make_gallery(
     [
         (
             plot_effect(effects, field, pairs, fig5.policies),
@@ -87,7 +90,7 @@ html.make_gallery(
 
 # %%
 rule = sweet.manifest["study"]["selection"]
-html.write_markdown(
+write_markdown(
     "Of {n:,} settings, the best by product was selected for every policy by "
     "<code>{rule[procedure]}</code>, with an indifference of {margin}, and simulated in "
     "{rule[check]:,} further missions. Only these are compared with the paper's means over "
@@ -99,7 +102,7 @@ html.write_markdown(
 )
 
 # %%
-html.make_gallery(
+make_gallery(
     [
         (
             plot_performance(checks, metric, paper[metric]),
@@ -123,7 +126,7 @@ html.make_gallery(
 indices = sobol_indices_of(sobol)
 of_ratio = indices[indices["metric"] == metrics.RATIO].dropna()
 caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
-html.make_gallery(
+make_gallery(
     [
         (plot_indices(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
         for policy, rows in of_ratio.groupby("policy", sort=False)
@@ -141,14 +144,14 @@ html.make_gallery(
 # ## Tables
 
 # %%
-html.make_table(
+make_table(
     main_effects.main_effects_table(effects, changes, ratios),
     f"Product; differences in points with {level} intervals, also of the collection ratio",
     effects,
 )
 
 # %%
-html.make_table(
+make_table(
     values.best_settings_table(sweet),
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
@@ -158,7 +161,7 @@ html.make_table(
 )
 
 # %%
-html.make_table(
+make_table(
     index_table(of_ratio).cells,
     f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
     data=indices,
@@ -172,11 +175,11 @@ html.make_table(
 
 # %%
 ranges = ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
-html.write_markdown(
+write_markdown(
     "The policies are the best learned one and the best heuristic of the study. For the Sobol "
     "indices all parameters are drawn together: {ranges}.",
     ranges=ranges,
 )
 
 # %%
-html.provenance_table([fig5, sweet, sobol])
+provenance_table([fig5, sweet, sobol])

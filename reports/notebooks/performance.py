@@ -29,7 +29,10 @@ from dess.analysis.answers.summary import plot_by_fleet, plot_performance
 from dess.analysis.figures import comparison
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.paper import values
-from dess.reports.pages import html
+from dess.reports.pages.markdown import escape_sentences, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_figure, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
@@ -44,13 +47,13 @@ caption = f"n = {numbers.format_span(overall['n'])} missions per policy; bars ar
 dashed = "Dashed: the paper's number, with the interval that its missions and our spread give."
 
 # %%
-html.make_answer(
+make_answer(
     questions.paper_sentence(overall, policies[0], values.TABLE_IV),
     questions.metrics_of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
 )
 
 # %%
-html.lead_figure(
+lead_figure(
     plot_performance(overall, PRODUCT, paper[PRODUCT]),
     "The product of every policy, and the paper's number",
     f"{caption} {dashed}",
@@ -61,10 +64,10 @@ html.lead_figure(
 # ## Why
 
 # %%
-html.write_markdown("{text}", text=html.escape_sentences(questions.guard_sentences(overall)))
+write_markdown("{text}", text=escape_sentences(questions.guard_sentences(overall)))
 
 # %%
-html.make_gallery(
+make_gallery(
     [
         (
             plot_performance(overall, metric, paper[metric]),
@@ -81,7 +84,7 @@ html.make_gallery(
 # The same missions, grouped by the number of UAVs that each drew.
 
 # %%
-html.make_gallery(
+make_gallery(
     [
         (plot_by_fleet(fleets, metric), f"{name} against the number of UAVs")
         for metric, name in METRICS.items()
@@ -93,7 +96,7 @@ html.make_gallery(
 # ## <a id="fig-4"></a>One setting: the paper's Fig. 4
 
 # %%
-html.make_gallery(
+make_gallery(
     [
         (
             plot_by_fleet(fig4_fleets, m, {i: p[m] for i, p in values.FIG_4.items()}),
@@ -117,11 +120,11 @@ html.make_gallery(
 # as the place of the charging zone.
 
 # %%
-html.write_markdown(
+write_markdown(
     "{snr} {weights} {text}",
     snr=values.SNR_IN_WORDS,
     weights=questions.weights_in_words(table4),
-    text=html.escape_sentences(optimality.in_words(bounded) if bounded else optimality.NOT_RUN),
+    text=escape_sentences(optimality.in_words(bounded) if bounded else optimality.NOT_RUN),
 )
 
 # %%
@@ -130,10 +133,10 @@ if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fle
         f"n = {numbers.format_span(gaps['n'])} missions of the study gap, with 95 % intervals."
     )
     display(
-        html.make_figure(
+        make_figure(
             comparison.plot_gaps(gaps), "The product of every policy, and the bound", caption
         ),
-        html.make_table(
+        make_table(
             optimality.fleet_bound_table(gaps), "Means, the upper bound, and the gap", data=gaps
         ),
     )
@@ -143,24 +146,24 @@ if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fle
 
 # %%
 marks = "▲ ours is above the paper's number by the interval of the difference, ▼ below, ≈ neither"
-html.make_table(
+make_table(
     questions.compare_with_paper(overall, {None: paper}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
     overall,
 )
 
 # %%
-html.write_markdown("{text}", text=html.escape_sentences(questions.way_home_in_words(overall)))
+write_markdown("{text}", text=escape_sentences(questions.way_home_in_words(overall)))
 
 # %%
-html.make_table(
+make_table(
     questions.compare_with_paper(fig4_fleets, fig4_paper),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
     fig4_fleets,
 )
 
 # %%
-html.make_table(
+make_table(
     tables.estimate_cells(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
     "Means with 95 % intervals, by number of UAVs",
     fleets,
@@ -170,7 +173,7 @@ html.make_table(
 # ## How this page was made
 
 # %%
-html.write_markdown(
+write_markdown(
     "Every mission of Table IV draws its parameters from Table II. Those of Fig. 4 have C_S "
     "{charge_start[0]} %, C_C {charge_complete[0]} %, {initial_data[0]:g} data units per node and "
     "a flying time of {flying_time[0]}.",
@@ -178,4 +181,4 @@ html.write_markdown(
 )
 
 # %%
-html.provenance_table([table4, fig4, *([bounded] if bounded else [])])
+provenance_table([table4, fig4, *([bounded] if bounded else [])])

@@ -31,7 +31,11 @@ from dess.analysis.paper import scorecard, values
 from dess.analysis.results.chunks import MANIFEST
 from dess.base.files.reading import paths_in
 from dess.policies.learner.config import read_description
-from dess.reports.pages import html
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer
+from dess.reports.pages.provenance import provenance_table, weights_table
+from dess.reports.pages.tables import make_table
+from dess.reports.pages.templates import render_part
 
 # %%
 folder = Path(str(trained or files("dess.policies") / "trained"))
@@ -42,10 +46,10 @@ rows = scorecard.scorecard(studies, read_curves(folder / "curves.parquet"))
 against = scorecard.against_paper(rows)
 
 # %%
-html.make_answer(scorecard.scorecard_sentence(rows))
+make_answer(scorecard.scorecard_sentence(rows))
 
 # %%
-html.lead_figure(
+lead_figure(
     plot_claims(against),
     "Our results minus the numbers that the paper prints, by policy",
     f"n = {numbers.format_span(against['n'])} missions per dot. Bars are 95 % intervals, with that "
@@ -67,7 +71,7 @@ html.lead_figure(
 def table(kind: str) -> None:
     if claims_of_kind := scorecard.of_kind(rows, kind):
         values = {"columns": scorecard.policy_names(rows), "caption": scorecard.KINDS[kind]}
-        display(html.render_part("scorecard.html", rows=claims_of_kind, **values))
+        display(render_part("scorecard.html", rows=claims_of_kind, **values))
 
 
 table(scorecard.DIAGNOSTIC)
@@ -83,10 +87,10 @@ table(scorecard.DIAGNOSTIC)
 # paper's learner need trainings as long as its own: shorter ones leave them inconclusive.
 
 # %%
-html.write_markdown("{snr}", snr=values.SNR_IN_WORDS)
+write_markdown("{snr}", snr=values.SNR_IN_WORDS)
 
 # %%
-html.make_table(scorecard.count_verdicts(rows), "Verdicts by policy")
+make_table(scorecard.count_verdicts(rows), "Verdicts by policy")
 
 # %% [markdown]
 # ## Tables
@@ -103,10 +107,10 @@ for config in paths_in(folder, f"{scorecard.PAPERS_NETWORK}/config.json"):
     departures = scorecard.departures_in_words(read_description(config.parent).training)
     line = "`{name}` has the paper's observation, network and Algorithm 1, but for {all}."
     shown = numbers.join_words(departures) if departures else "nothing"
-    display(html.write_markdown(line, name=scorecard.PAPERS_NETWORK, all=shown))
+    display(write_markdown(line, name=scorecard.PAPERS_NETWORK, all=shown))
 
 # %%
-html.weights_table(folder)
+weights_table(folder)
 
 # %%
-html.provenance_table(studies.values())
+provenance_table(studies.values())

@@ -60,8 +60,11 @@ from dess.analysis.answers.settings.sobol import (
 )
 from dess.analysis.answers.summary import draw_performance
 from dess.analysis.metrics import METRICS, SUCCESS, metric_of
-from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.templates import render_part
 
 # %%
 study = load_results(Path(results))
@@ -71,27 +74,27 @@ called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
 search = search_of(study)
-html.make_answer(search.sentence())
+make_answer(search.sentence())
 
 # %% tags=["if-answer"]
 ranked = rank_settings(study, by)
 best = ranked.iloc[0]
 
 # %% tags=["if-answer"]
-html.make_answer(best_settings_sentence(study, ranked, by))
+make_answer(best_settings_sentence(study, ranked, by))
 
 # %% tags=["if-sensitivity"]
-html.make_answer(variance_sentence(study, by))
+make_answer(variance_sentence(study, by))
 
 # %%
-html.lead_figure(*draw_main_figure(study, by))
+lead_figure(*draw_main_figure(study, by))
 
 # %% tags=["if-brief"]
 from dess.analysis.ask.brief import brief_sentences
 
-html.show_parts(
+show_parts(
     page.draw_typical_mission(study),
-    html.render_part("brief.html", lines=brief_sentences(study)),
+    render_part("brief.html", lines=brief_sentences(study)),
 )
 
 # %%
@@ -100,7 +103,7 @@ page.make_panel_of(study, by)
 # %% tags=["if-sheet"]
 from dess.analysis.ask.assumptions import assumption_sentences
 
-html.render_part("assumptions.html", lines=assumption_sentences(study, by))
+render_part("assumptions.html", lines=assumption_sentences(study, by))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -109,13 +112,13 @@ html.render_part("assumptions.html", lines=assumption_sentences(study, by))
 # fleet gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-html.show_parts(
+show_parts(
     fleet_tables.fleet_table(study, by if metric else SUCCESS),
-    html.write_markdown("{answers}", answers=page.list_reasons(study)),
+    write_markdown("{answers}", answers=page.list_reasons(study)),
 )
 
 # %% tags=["if-conditions"]
-html.show_parts(fleet_tables.condition_table(study))
+show_parts(fleet_tables.condition_table(study))
 
 # %% [markdown] tags=["if-around"]
 # ## What if
@@ -126,7 +129,7 @@ html.show_parts(fleet_tables.condition_table(study))
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
 
-html.show_parts(around.table_around(study), draw_falls(study))
+show_parts(around.table_around(study), draw_falls(study))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -134,8 +137,8 @@ html.show_parts(around.table_around(study), draw_falls(study))
 # The check had no part in the selection, so its means are unbiased.
 
 # %% tags=["if-cheapest"]
-no_check = html.write_markdown("No setting was checked.")
-html.show_parts(no_check if study.checks.empty else fleet_tables.check_table(study))
+no_check = write_markdown("No setting was checked.")
+show_parts(no_check if study.checks.empty else fleet_tables.check_table(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -148,24 +151,24 @@ html.show_parts(no_check if study.checks.empty else fleet_tables.check_table(stu
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-html.show_parts(
+show_parts(
     best_settings_table(study, ranked, by),
     best_of_policies_table(study, by),
-    html.write_markdown("{why}", why=allowance_for_setting(study, ranked, by)),
+    write_markdown("{why}", why=allowance_for_setting(study, ranked, by)),
 )
 
 # %% tags=["if-one-setting"]
-html.show_parts(
+show_parts(
     (draw_performance(study, of) for of in METRICS),
     tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, METRICS)),
-    html.write_markdown("{weights}", weights=summary.weights_in_words(study)),
+    write_markdown("{weights}", weights=summary.weights_in_words(study)),
 )
 
 # %% [markdown] tags=["if-priced-search"]
 # ## Costs
 
 # %% tags=["if-priced-search"]
-html.show_parts(cost_parts_table(study))
+show_parts(cost_parts_table(study))
 
 # %% [markdown] tags=["if-costs"]
 # ## Costs
@@ -174,8 +177,8 @@ html.show_parts(cost_parts_table(study))
 # The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
-html.show_parts(
-    html.write_markdown("{prices}", prices=prices_in_words(study)),
+show_parts(
+    write_markdown("{prices}", prices=prices_in_words(study)),
     draw_cost_fronts(study),
     cost_front_table(study),
     cost_parts_table(study),
@@ -188,9 +191,9 @@ html.show_parts(
 # missions were ruled out early. The check had no part in the selection.
 
 # %% tags=["if-selection"]
-html.show_parts(
+show_parts(
     summary.selection_table(study),
-    html.write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
+    write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
     tables.means_table(
         summary.means_of_check(study), tables.CHECKED, with_way_home(study, metrics)
     ),
@@ -202,42 +205,42 @@ html.show_parts(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-html.show_parts(summary.precision_table(summary.reached_precisions(study)))
+show_parts(summary.precision_table(summary.reached_precisions(study)))
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
 
 # %% tags=["if-one-field"]
 (field,) = varied_values(study)
-html.make_gallery(draw_curves(study, field, metric=of) for of in metrics)
+make_gallery(draw_curves(study, field, metric=of) for of in metrics)
 
 # %% tags=["if-two-fields"]
-html.make_gallery(draw_heat_maps(study, metrics))
+make_gallery(draw_heat_maps(study, metrics))
 
 # %% tags=["if-many-fields"]
-html.make_gallery(draw_small_multiples(study, by))
+make_gallery(draw_small_multiples(study, by))
 
 # %% tags=["if-one-at-a-time"]
-html.make_gallery(draw_one_at_a_time(study))
+make_gallery(draw_one_at_a_time(study))
 
 # %% tags=["if-sampled"]
-html.make_gallery(draw_scatter(study, of) for of in metrics)
+make_gallery(draw_scatter(study, of) for of in metrics)
 
 # %% tags=["if-sensitivity"]
-html.show_parts(draw_indices(study, by), index_table(sobol_indices_of(study)))
+show_parts(draw_indices(study, by), index_table(sobol_indices_of(study)))
 
 # %% [markdown] tags=["if-sensitivity"]
 # A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
 # interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
-html.show_parts((draw_main_effects(study, of) for of in metrics), effect_table(study, by))
+show_parts((draw_main_effects(study, of) for of in metrics), effect_table(study, by))
 
 # %% [markdown] tags=["if-settings"]
 # ## Comparison with a baseline
 
 # %% tags=["if-settings"]
-html.write_markdown(
+write_markdown(
     "Every policy is compared with itself at design point "
     "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
@@ -245,7 +248,7 @@ html.write_markdown(
 )
 
 # %% tags=["if-settings"]
-html.show_parts(baseline_table(study, baseline, by))
+show_parts(baseline_table(study, baseline, by))
 
 # %% [markdown] tags=["if-policies"]
 # ## Comparison of the policies
@@ -254,13 +257,13 @@ html.show_parts(baseline_table(study, baseline, by))
 
 # %% tags=["if-policies"]
 compared = summary.comparison_table(study)
-html.show_parts(
+show_parts(
     compared,
-    html.write_markdown("{why}", why=summary.allowance_for_difference(compared.data, "policy")),
+    write_markdown("{why}", why=summary.allowance_for_difference(compared.data, "policy")),
 )
 
 # %% tags=["if-learned"]
-html.show_parts(summary.learner_table(study))
+show_parts(summary.learner_table(study))
 
 # %% [markdown]
 # ## Single missions
@@ -277,8 +280,8 @@ worst = summary.worst_missions(study, search.best.policy, point=search.shown_poi
 
 # %% tags=["if-ranked"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
-html.show_parts(
-    html.write_markdown("These figures show {whose}:", whose=whose),
+show_parts(
+    write_markdown("These figures show {whose}:", whose=whose),
     [plot_distribution(missions, by)],
     summary.quantile_table(spread, by),
 )
@@ -287,19 +290,19 @@ html.show_parts(
 worst = summary.worst_missions(study, summary.best_policy(study.missions))
 
 # %%
-html.show_parts(
+show_parts(
     summary.worst_missions_table(study, worst),
-    html.write_markdown("{commands}", commands=page.list_commands(study, worst)),
+    write_markdown("{commands}", commands=page.list_commands(study, worst)),
 )
 
 # %% tags=["if-sheet"]
-html.render_part("left_out.html")
+render_part("left_out.html")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.write_markdown("{simulated}", simulated=page.list_simulated(study))
+write_markdown("{simulated}", simulated=page.list_simulated(study))
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

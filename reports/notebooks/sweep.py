@@ -33,7 +33,10 @@ from dess.analysis.answers.settings.ranking import (
     best_settings_table,
 )
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from dess.reports.pages import html, study
+from dess.reports.pages import study
+from dess.reports.pages.markdown import command_block, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
 
 # %%
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
@@ -47,10 +50,10 @@ drawn = {
 }
 
 # %%
-html.make_answer(best_settings_sentence(answer.results, ranked, PRODUCT))
+make_answer(best_settings_sentence(answer.results, ranked, PRODUCT))
 
 # %%
-html.lead_figure(*drawn[PRODUCT])
+lead_figure(*drawn[PRODUCT])
 
 # %%
 study.make_panel_of(answer.results, PRODUCT)
@@ -59,7 +62,7 @@ study.make_panel_of(answer.results, PRODUCT)
 # ## Why
 
 # %%
-html.make_gallery([drawn[SUCCESS], drawn[RATIO]])
+make_gallery([drawn[SUCCESS], drawn[RATIO]])
 
 # %% [markdown]
 # ## How far to trust it
@@ -69,13 +72,13 @@ html.make_gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-html.show_parts(best_settings_table(answer.results, ranked, PRODUCT))
+show_parts(best_settings_table(answer.results, ranked, PRODUCT))
 
 # %% [markdown]
 # ## Tables
 
 # %%
-html.show_parts(best_of_policies_table(answer.results, PRODUCT))
+show_parts(best_of_policies_table(answer.results, PRODUCT))
 
 # %% [markdown]
 # ## Change the question
@@ -85,13 +88,13 @@ html.show_parts(best_of_policies_table(answer.results, PRODUCT))
 # cheapest fleet ([own sea](own-sea.html)).
 
 # %%
-html.write_markdown("{lines}", lines=html.command_block([answer.question.command]))
+write_markdown("{lines}", lines=command_block([answer.question.command]))
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.write_markdown("{simulated}", simulated=study.list_simulated(answer.results))
+write_markdown("{simulated}", simulated=study.list_simulated(answer.results))
 
 # %%
-html.provenance_table([answer.results])
+provenance_table([answer.results])

@@ -33,9 +33,12 @@ from dess.analysis import metrics, tables, what_if
 from dess.analysis.answers import summary
 from dess.analysis.answers.variation import measured_columns
 from dess.analysis.metrics import metric_of
-from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.markdown import code_block, command_block, escape_sentences, write_markdown
 from dess.reports.pages.panel import make_panel
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 asked = what_if(
@@ -45,11 +48,11 @@ found = asked.results
 variation = asked.variation
 
 # %%
-html.make_answer(variation.sentence())
+make_answer(variation.sentence())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-html.lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
+lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
 
 # %%
 sides = found.scenario(0), found.scenario(1)
@@ -59,10 +62,10 @@ make_panel(*sides, scenario, found.policies, seed, given=found.given_values(0))
 # ## Why
 
 # %%
-html.write_markdown("Of the pairs, {better}.", better=html.escape_sentences(variation.winners()))
+write_markdown("Of the pairs, {better}.", better=escape_sentences(variation.winners()))
 
 # %%
-html.write_markdown("{contrasts}", contrasts=html.escape_sentences(variation.contrasts()))
+write_markdown("{contrasts}", contrasts=escape_sentences(variation.contrasts()))
 
 # %%
 extended = [metric for metric in measured_columns(found) if found.missions[metric].any()]
@@ -70,7 +73,7 @@ caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the me
 
 # %%
 spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
-html.make_gallery(
+make_gallery(
     [
         (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
@@ -89,23 +92,23 @@ html.make_gallery(
 
 # %%
 examples = variation.typical(), variation.worst()
-html.make_gallery([drawing for example in examples for drawing in example.drawings()])
+make_gallery([drawing for example in examples for drawing in example.drawings()])
 
 # %% [markdown]
 # ## How far to trust it
 
 # %%
-html.write_markdown(
+write_markdown(
     "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
-    answer=html.escape_sentences(variation.answer()),
-    reading=html.escape_sentences(variation.reading()),
+    answer=escape_sentences(variation.answer()),
+    reading=escape_sentences(variation.reading()),
     why=summary.allowance_for_difference(variation.table(), "policy"),
     weights=summary.weights_in_words(found),
     notes=page.list_notes(found),
 )
 
 # %%
-html.make_table(
+make_table(
     variation.pairing(),
     f"What common random numbers gain in the differences of n = {missions:,} pairs: the variance "
     "that is left of that of independent missions, and how many of these would be as precise",
@@ -120,7 +123,7 @@ for policy in found.policies:
         "▲ higher in the variation, ▼ lower, △ and ▽ the same in what was seen, where a rare "
         "failure is not ruled out, ≈ inconclusive"
     )
-    display(html.make_table(variation.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
+    display(make_table(variation.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
@@ -129,25 +132,25 @@ for policy in found.policies:
 # lines are the same question as a study: every further row is another variation.
 
 # %%
-command = html.command_block([asked.question.command])
-study = html.code_block("toml", variation.as_toml().rstrip("\n"))
-html.write_markdown("{command}\n\n{study}", command=command, study=study)
+command = command_block([asked.question.command])
+study = code_block("toml", variation.as_toml().rstrip("\n"))
+write_markdown("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
 name = found.manifest["study"]["scenario"]
-html.make_table(variation.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
+make_table(variation.field_table(), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %%
 for example in examples:
-    lines = html.command_block(example.commands())
+    lines = command_block(example.commands())
     display(
-        html.write_markdown(
-            "{effect}\n\n{lines}", effect=html.escape_sentences(example.effect()), lines=lines
+        write_markdown(
+            "{effect}\n\n{lines}", effect=escape_sentences(example.effect()), lines=lines
         )
     )
 
 # %%
-html.provenance_table([found])
+provenance_table([found])

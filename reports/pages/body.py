@@ -1,6 +1,6 @@
 """The page of a notebook that has been run: nbconvert fills our template with what cells say.
 
-A cell says what it is as data (``html.Part``), Markdown, HTML or text; a cell of Markdown that
+A cell says what it is as data (``parts.Part``), Markdown, HTML or text; a cell of Markdown that
 begins with a second-level heading begins a section. Here are the filters of the template
 ``report.html``, which number figures, explain terms and make the sections.
 """
@@ -18,9 +18,10 @@ from nbformat import NotebookNode
 from pygments.formatters import HtmlFormatter
 
 import dess
-from dess.reports.pages.html import JINJA, PANEL_SCRIPT, PART, panel_hash, set_indices
 from dess.reports.pages.notebook import SCORECARD, Report
 from dess.reports.pages.page import Card, Page, Picture
+from dess.reports.pages.parts import PART
+from dess.reports.pages.templates import JINJA, PANEL_SCRIPT, panel_hash, set_indices
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 FOLDED = "How this page was made"  # the heading of the section with method and provenance

@@ -17,15 +17,15 @@ from dess import InputError
 from dess.analysis.wasm.module import MOST_BYTES, read_module
 from dess.base.files.reading import paths_in, read_bytes
 from dess.reports.pages import INDEX, PREFIX
-from dess.reports.pages.html import (
+from dess.reports.pages.notebook import GROUPS, SCORECARD
+from dess.reports.pages.page import Page
+from dess.reports.pages.templates import (
     EXAMPLE_SCRIPT,
     fill_page,
     load_template,
     pack,
     panel_script,
 )
-from dess.reports.pages.notebook import GROUPS, SCORECARD
-from dess.reports.pages.page import Page
 
 log = logging.getLogger(__name__)
 

@@ -23,7 +23,6 @@ from IPython.display import HTML, Markdown
 from markupsafe import Markup
 
 from dess import InputError, simulate_batch
-from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
 from dess.analysis.metrics import (
@@ -38,6 +37,8 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.verdict import rule_for_pages
 from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
@@ -48,15 +49,15 @@ from dess.base.files.writing import toml_value
 from dess.model.record import Records, empty_records, measures_of
 from dess.policies.heuristics import KINDS
 from dess.policies.registry import load
-from dess.reports.pages.html import (
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.page import PANEL, hidden_element
+from dess.reports.pages.templates import (
     PANEL_SCRIPT,
     SINGLE_SCRIPT,
     pack,
     panel_script,
     render_part,
-    write_markdown,
 )
-from dess.reports.pages.page import PANEL, hidden_element
 from dess.scenario.data_sheet import Units
 from dess.scenario.fields import dotted, is_number
 from dess.scenario.quantities import measured, printed, times
@@ -205,6 +206,7 @@ class Panel(Document):
             "fixed": [f"{key}={toml_value(self.given[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
+            "rule": rule_for_pages(),
             "prices": [*_describe_prices(self.costs)],
             "priced": [*_other_prices(self.costs)],
             "grid": self._grid(settings),

@@ -33,7 +33,15 @@ from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.study.selection import Selection
 from dess.policies.registry import is_path, list_departures
-from dess.reports.pages import PREFIX, html, notebook
+from dess.reports.pages import PREFIX, notebook
+from dess.reports.pages.markdown import (
+    Marked,
+    command_block,
+    escape_sentences,
+    escape_text,
+    fill_markdown,
+    format_code,
+)
 from dess.reports.pages.notebook import Report, cell_tags
 from dess.reports.pages.panel import Search, make_panel
 from dess.scenario.scenario import SEA
@@ -42,7 +50,7 @@ _MOST_FIELDS = 3  # the largest number of fields that a title names
 _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
-def list_simulated(results: Results) -> html.Marked:
+def list_simulated(results: Results) -> Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
     study = manifest.study
@@ -54,15 +62,15 @@ def list_simulated(results: Results) -> html.Marked:
     also = ""
     if fixed:
         also = f", with {numbers.join_words(fixed)}"
-    policies = numbers.join_words([html.format_code(policy) for policy in results.policies])
+    policies = numbers.join_words([format_code(policy) for policy in results.policies])
     missions = numbers.format_span(n for of_policy in manifest.missions for n in of_policy)
     unit = " per policy"
     if points > 1:
         unit += " and design point"
     lines = [
-        html.fill_markdown(
+        fill_markdown(
             "- **Scenario:** {scenario}{fixed}.",
-            scenario=html.format_code(study.scenario),
+            scenario=format_code(study.scenario),
             fixed=also,
         ),
         f"- **Policies:** {policies}.",
@@ -70,14 +78,14 @@ def list_simulated(results: Results) -> html.Marked:
         f"- **Missions:** {missions}{unit}, {len(results.missions):,} in all.",
         list_notes(results),
     ]
-    return html.Marked("\n".join(filter(None, lines)))
+    return Marked("\n".join(filter(None, lines)))
 
 
-def list_notes(results: Results) -> html.Marked:
+def list_notes(results: Results) -> Marked:
     """Which trained policies act outside of their training, as a list."""
     departures = list_departures(results.policies, results.store.manifest.scenarios)
-    lines = [html.fill_markdown("- **Note:** {line}.", line=line) for line in departures]
-    return html.Marked("\n".join(lines))
+    lines = [fill_markdown("- **Note:** {line}.", line=line) for line in departures]
+    return Marked("\n".join(lines))
 
 
 def page_title(results: Results, varied: Iterable[str]) -> str:
@@ -137,49 +145,48 @@ def shown_metrics(results: Results, by: str) -> list[str]:
     return metrics_of_page(by)
 
 
-def list_guarantees(results: Results) -> html.Marked:
+def list_guarantees(results: Results) -> Marked:
     """What is guaranteed about the selections, as a list."""
     rows = summary.selected_settings(results).itertuples()
     lines = [
-        html.fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee)
-        for row in rows
+        fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows
     ]
-    return html.Marked("\n".join(lines))
+    return Marked("\n".join(lines))
 
 
-def list_commands(results: Results, missions: pd.DataFrame) -> html.Marked:
+def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
     """The commands that simulate missions again, and the folder that they name.
 
     Args:
         results: The study.
         missions: Rows of ``summary.worst_missions``.
     """
-    return html.fill_markdown(
+    return fill_markdown(
         "These commands simulate them again. {folder} stands for the results folder of the study, "
         "wherever it is:\n\n{lines}",
-        folder=html.format_code(results.usual_folder),
-        lines=html.command_block(missions["command"]),
+        folder=format_code(results.usual_folder),
+        lines=command_block(missions["command"]),
     )
 
 
-def list_reasons(results: Results) -> html.Marked:
+def list_reasons(results: Results) -> Marked:
     """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
     search = search_of(results)
     lines = [f"- {text}" for text in (prices_in_words(results), *search.reason_sentences())]
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(search.guarantee_sentences()))
-    return html.escape_sentences("\n".join(lines) + f"\n\n{sure}")
+    return escape_sentences("\n".join(lines) + f"\n\n{sure}")
 
 
-def _describe_design(results: Results) -> Iterator[html.Marked]:
+def _describe_design(results: Results) -> Iterator[Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
     if fields := varied_values(results):
         line = "- **Design:** {kind}, {points:,} design points. It varies:"
-        yield html.fill_markdown(line, kind=html.format_code(results.design), points=points)
+        yield fill_markdown(line, kind=format_code(results.design), points=points)
     for field, values in fields.items():
         unit = f" [{field_named(field).unit}]".removesuffix(" []")
         line = "    - {field}{unit}: {values}"
-        yield html.fill_markdown(
+        yield fill_markdown(
             line, field=field_named(field).within, unit=unit, values=_format_values(values)
         )
 
@@ -227,7 +234,7 @@ def make_study_report(results: Results, values: Mapping[str, Any] = MappingProxy
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in cell_tags(cell))
     ]
-    original.cells[0].source = f"# {html.escape_text(title)}\n\n{html.escape_text(description)}"
+    original.cells[0].source = f"# {escape_text(title)}\n\n{escape_text(description)}"
     report = notebook.make_report(f"{PREFIX}{study.name}", original)
     return replace(report, title=title, description=" ".join(description.split()))
 

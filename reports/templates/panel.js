@@ -229,7 +229,7 @@ function fill() {
             const name = `${counted("uavs", uavs, "UAV")}, ${counted("pads", pads, "pad")}`;
             return {uavs, pads, name, track: trackOf(`${uavs} ${pads}`, chosen, error)};
         });
-        grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"), data.indifference);
+        grid = new Grid(cells, required, data.metrics.find(({key}) => key === "cost"), data.indifference, data.rule);
         gridKey = keyOfGrid();
     }
     grid.extend(Math.min(grid.count + askedOfGrid(), MOST_MISSIONS));
@@ -297,7 +297,7 @@ function showVerdicts() {
         const item = document.createElement("li");
         item.append(`${requirementInWords(requirement)}: `);
         run.sides.forEach((side, n) => {
-            const word = verdict(requirement, run.tracks[side].series.estimate(requirement.metric));
+            const word = verdict(data.rule, requirement, run.tracks[side].series.estimate(requirement.metric));
             const mark = document.createElement("strong");
             mark.className = word;
             mark.textContent = word;

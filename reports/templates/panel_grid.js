@@ -10,8 +10,6 @@
  * @property {Track} track
  */
 
-/** @typedef {"meets" | "misses" | "open"} Verdict */
-
 const GRID_ERROR = 0.05; // the probability that an interval of any cell fails
 const BLOCK = 50; // missions of a cell before it is another one's turn
 const FEWEST = 30; // missions of a cell, with which its cost has an interval
@@ -22,12 +20,14 @@ class Grid {
      * @param {Requirement[]} requirements
      * @param {Metric} cost
      * @param {number} indifference - the least saving that matters
+     * @param {Rule} rule
      */
-    constructor(cells, requirements, cost, indifference) {
+    constructor(cells, requirements, cost, indifference, rule) {
         this.cells = cells;
         this.requirements = requirements;
         this.cost = cost;
         this.indifference = indifference;
+        this.rule = rule;
         this.isOver = true;
         this.target = 0; // missions in all
         this.away = 0; // orders that are not answered
@@ -110,11 +110,12 @@ class Grid {
     /**
      * What is known of the requirements together, within their tolerances: the most serious of what is known of each.
      * @param {Cell} cell
-     * @returns {Verdict}
+     * @returns {string}
      */
     verdict({track}) {
-        const verdicts = this.requirements.map((required) => verdict(required, track.series.estimate(required.metric), required.metric.tolerance));
-        return verdicts.includes("misses") ? "misses" : verdicts.includes("open") ? "open" : "meets";
+        const verdicts = this.requirements.map((required) =>
+            verdict(this.rule, required, track.series.estimate(required.metric), required.metric.tolerance));
+        return this.rule.mostSeriousFirst.find((word) => verdicts.includes(word));
     }
 
     /**
@@ -124,11 +125,11 @@ class Grid {
      */
     cheapest() {
         const costs = new Map(this.cells.map((cell) => [cell, this.costOf(cell)]));
-        const good = this.cells.filter((cell) => this.verdict(cell) === "meets" && costs.get(cell).count >= FEWEST);
+        const good = this.cells.filter((cell) => this.verdict(cell) === "met" && costs.get(cell).count >= FEWEST);
         if (!good.length) return null;
         const cell = good.reduce((least, other) => costs.get(other).mean < costs.get(least).mean ? other : least);
         const rivals = this.cells.filter((other) =>
-            other !== cell && !(costs.get(cell).high - costs.get(other).low <= this.indifference) && this.verdict(other) !== "misses");
+            other !== cell && !(costs.get(cell).high - costs.get(other).low <= this.indifference) && this.verdict(other) !== "missed");
         return {cell, rivals};
     }
 

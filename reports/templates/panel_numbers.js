@@ -139,14 +139,18 @@ function requirementInWords({metric, bound}) {
 const roomOf = ({metric, bound}, number) => metric.less ? bound - number : number - bound;
 
 /**
- * Whether a whole interval keeps a bound (*meets*), breaks it (*misses*), or neither (*open*). Within
- * the tolerance of the bound, either verdict is right: the mean decides where both are known.
- * @type {(requirement: Requirement, estimate: Estimate, tolerance?: number) => "meets" | "misses" | "open"}
+ * The verdicts by what is known of a bound, as ``stats/verdict.py`` has them.
+ * @typedef { {mostSeriousFirst: string[], table: (string | null)[][]}} Rule
  */
-function verdict(requirement, {mean, low, high, count}, tolerance = 0) {
-    if (!count) return "open";
-    const rooms = [low, high].map((end) => roomOf(requirement, end));
-    const isMet = Math.min(...rooms) >= -tolerance, isMissed = Math.max(...rooms) < tolerance;
-    if (isMet && isMissed) return roomOf(requirement, mean) >= 0 ? "meets" : "misses";
-    return isMet ? "meets" : isMissed ? "misses" : "open";
+
+/**
+ * Whether a whole interval keeps a bound, breaks it, or neither. Both are known only within the
+ * tolerance of the bound: there the mean decides.
+ * @type {(rule: Rule, requirement: Requirement, estimate: Estimate, tolerance?: number) => string}
+ */
+function verdict({table}, requirement, {mean, low, high, count}, tolerance = 0) {
+    const rooms = count ? [low, high].map((end) => roomOf(requirement, end)) : [NaN];
+    const isKept = Math.min(...rooms) >= -tolerance, isBroken = Math.max(...rooms) < tolerance;
+    const isMeanGood = roomOf(requirement, mean) >= 0;
+    return table[Number(isKept)][Number(isBroken)] ?? table[Number(isMeanGood)][Number(!isMeanGood)];
 }

@@ -22,7 +22,7 @@ from pyarrow.types import is_floating
 
 from dess.analysis.results.chunks import name_of, short_hash
 from dess.analysis.results.parquet import INDICES
-from dess.policies.learner import trained
+from dess.policies.learner.arrays import hash_arrays, read_arrays
 from dess.policies.learner.session import CHECKPOINT
 from dess.reports.pages.page import Page
 from tests.analysis.hostile import hostile_folder
@@ -160,8 +160,8 @@ def seal(box: Path, folder: str) -> None:
     header, data = _split(path)
     inner = json.loads(header["__metadata__"]["dess"])
     inner.pop("sha256", None)
-    values, _ = trained.read_arrays(path, len(data) + 2**20)
-    inner["sha256"] = trained.hash_arrays(inner, values)
+    values, _ = read_arrays(path, len(data) + 2**20)
+    inner["sha256"] = hash_arrays(inner, values)
     header["__metadata__"]["dess"] = json.dumps(inner)
     _join(path, json.dumps(header), data)
 

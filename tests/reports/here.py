@@ -17,10 +17,10 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_output
 
 from dess import InputError
-from dess.reports.pages import html, kernels
-from dess.reports.pages.html import PART, Part
+from dess.reports.pages import figures, kernels, parts
 from dess.reports.pages.kernels import Progress
 from dess.reports.pages.notebook import Report
+from dess.reports.pages.parts import PART, Part
 
 FOLDER = "notebooks-"  # what the names of the folders begin with in which notebooks run
 
@@ -31,7 +31,7 @@ def notebooks_here(is_drawn: bool = False) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "run_reports", run_reports)
         if not is_drawn:
-            patch.setattr(html, "encode_figure", lambda drawing, kind: b"")
+            patch.setattr(figures, "encode_figure", lambda drawing, kind: b"")
         yield
 
 
@@ -60,7 +60,7 @@ def run_cells(report: Report) -> Iterator[tuple[NotebookNode, list[Any]]]:
     scope: dict[str, Any] = {}
     shown: list[Any] = []
     with pytest.MonkeyPatch.context() as patch:
-        for module in (IPython.display, html):
+        for module in (IPython.display, parts):
             patch.setattr(module, "display", lambda *pieces: shown.extend(pieces))
         for cell in report.cells:
             tree = ast.parse(cell.source)

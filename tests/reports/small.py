@@ -15,7 +15,7 @@ from dess.analysis import load_study, run_study
 from dess.analysis.bound import Bound
 from dess.analysis.execution import jobs
 from dess.policies.planner import Budget, Planner
-from dess.reports.pages import html
+from dess.reports.pages import figures
 from dess.reports.pages.notebook import Report, read_report
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
@@ -138,7 +138,7 @@ def shown_by(source: str | Report, **parameters: Any) -> str:
     report = read_report(source) if isinstance(source, str) else source
     report.set_parameters(parameters)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(html, "encode_figure", lambda drawing, kind: b"")
+        patch.setattr(figures, "encode_figure", lambda drawing, kind: b"")
         return "\n".join(piece.data for _, pieces in run_cells(report) for piece in pieces)
 
 

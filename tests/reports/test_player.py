@@ -23,7 +23,7 @@ from dess.analysis.results.event_log import (
     uav_slots,
 )
 from dess.model.state import sample_scenario
-from dess.reports.pages.html import Part
+from dess.reports.pages.parts import Part
 from dess.reports.player import AGE_READING, Shown, explain_player, make_player, player_script
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the

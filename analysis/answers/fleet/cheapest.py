@@ -24,8 +24,6 @@ from dess.analysis.answers.fleet.costs import (
     prices_in_words,
 )
 from dess.analysis.answers.fleet.requirements import (
-    Requirement,
-    Verdict,
     least_spare,
     metric_asked_for,
     relative_spare,
@@ -57,6 +55,8 @@ from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
 from dess.analysis.metrics import COST, HOME, SUCCESS, Metric, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.requirement import Requirement
+from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
 from dess.analysis.study.prices import has_priced_types
 from dess.scenario.fields import ZONE_PADS

@@ -32,7 +32,7 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.results.tables import Results, compute_once
-from dess.analysis.stats.verdict import front_membership, on_front
+from dess.analysis.stats.front import front_membership, on_front
 from dess.analysis.study.prices import PURCHASE, stranded_uavs
 from dess.analysis.tables import MOST_ROWS, Table
 from dess.base.errors import unknown_name
@@ -147,7 +147,7 @@ def cost_front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     Returns:
         The rows of ``priced_settings`` with two more columns. ``on_front`` tells whether the
         setting is on the front of the estimates, under its condition. ``probability`` is the
-        probability that it is on the front of the true means (``stats.verdict.front_membership``).
+        probability that it is on the front of the true means (``stats.front.front_membership``).
 
     Raises:
         InputError: If the study has no prices, or there is no such metric.

@@ -11,7 +11,6 @@ from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_fronts
 from dess.analysis.answers.fleet.requirements import (
-    Verdict,
     metric_asked_for,
     requirements_in_words,
     requirements_of,
@@ -22,6 +21,7 @@ from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.style import plot_front
 from dess.analysis.metrics import COST, Metric
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.verdict import Verdict
 from dess.analysis.tables import INTERVALS
 
 MOST_CONDITIONS = 9  # the largest number of conditions with a figure; the table has all

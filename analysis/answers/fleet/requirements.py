@@ -1,16 +1,11 @@
-"""The requirements of a search for the cheapest fleet, and whether a fleet meets them.
+"""The requirements of a search for the cheapest fleet, and by how much fleets keep them.
 
-    for requirement in requirements_of(results):  # of a study that searches for the cheapest fleet
-        print(requirement.in_words, requirement.margin(0.995))
-
-A requirement is a bound on the mean of a metric, such as a success of at least 99 % or an age of
-information of at most 90 minutes.
+for requirement in requirements_of(results):  # of a study that searches for the cheapest fleet
+    print(requirement.in_words, requirement.margin(0.995))
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -18,80 +13,9 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.metrics import Metric, column_in_sheet_unit, metric_of
 from dess.analysis.results.tables import Results
+from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.cheapest import Cheapest
 from dess.scenario.quantities import unit_of
-
-
-class Verdict(StrEnum):
-    """Whether a fleet meets requirements; *open* is what the missions do not decide."""
-
-    MISSED = "missed"  # the most serious first
-    OPEN = "open"
-    MET = "met"
-
-    @classmethod
-    def of_all(cls, verdicts: Sequence[str]) -> "Verdict":
-        """The verdict on several requirements, or conditions, together: the most serious one."""
-        return next(verdict for verdict in cls if verdict in verdicts)
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """A bound that the mean of a metric has to keep.
-
-    Attributes:
-        metric: The metric, as the missions have it: with a data sheet in its unit. It is told in
-            the unit in which it was required.
-        bound: The least mean, or the largest of a metric of which less is better.
-    """
-
-    metric: Metric
-    bound: float
-
-    @property
-    def column(self) -> str:
-        """The column of the metric in tables of missions."""
-        return self.metric.column
-
-    @property
-    def in_words(self) -> str:
-        """The requirement, as ``success of at least 99 %``."""
-        return f"{self.metric.within} of {self.bound_in_words}"
-
-    @property
-    def bound_in_words(self) -> str:
-        """The bound alone, as ``at least 99 %``."""
-        if self.metric.less_is_better:
-            side = "at most"
-        else:
-            side = "at least"
-        return f"{side} {self.metric.amount(self.bound)}"
-
-    def shifted(self, tolerance: float, horizon: float) -> "Requirement":
-        """The requirement that is easier by the tolerance of a search.
-
-        Args:
-            tolerance: The tolerance, of an age as a share of the horizon.
-            horizon: The largest age that data can have.
-        """
-        if self.metric.less_is_better:
-            return Requirement(self.metric, self.bound + tolerance * horizon)
-        return Requirement(self.metric, self.bound - tolerance)
-
-    def margin(self, value: Any) -> Any:
-        """How far a value, or each of an array, is on the right side; negative on the wrong one."""
-        if self.metric.less_is_better:
-            return self.bound - value
-        return value - self.bound
-
-    def verdict(self, low: float, high: float) -> Verdict:
-        """Whether a whole interval keeps the bound, breaks it, or neither."""
-        margins = self.margin(low), self.margin(high)
-        if min(margins) >= 0:
-            return Verdict.MET
-        if max(margins) < 0:
-            return Verdict.MISSED
-        return Verdict.OPEN
 
 
 def requirements_of(results: Results) -> list[Requirement]:

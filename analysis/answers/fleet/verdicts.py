@@ -10,10 +10,11 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.answers.fleet.costs import priced_settings
-from dess.analysis.answers.fleet.requirements import Verdict, metric_asked_for, requirements_of
+from dess.analysis.answers.fleet.requirements import metric_asked_for, requirements_of
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.metrics import COST, SUCCESS, Metric
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.cheapest import CheapestChoice
 
 ALL_CONDITIONS = "all conditions"
@@ -77,7 +78,7 @@ def _judge_under_all_conditions(results: Results, policy: str, rows: pd.DataFram
         together[ends_of] = rows.loc[worst, ends_of]
     together[interval_columns(COST)] = rows[interval_columns(COST)].mean()
     together["condition"] = ALL_CONDITIONS
-    together["verdict"] = Verdict.of_all([*rows["verdict"]])
+    together["verdict"] = Verdict.of_all(rows["verdict"])
     together["n"] = rows["n"].min()
     selected = cheapest_choice(results, policy).answers[-1].points
     together["selected"] = {*selected} == {*rows["point"]}

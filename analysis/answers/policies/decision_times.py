@@ -19,7 +19,7 @@ from dess.analysis.figures import style
 from dess.analysis.figures.style import plot_front
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.verdict import on_front
+from dess.analysis.stats.front import on_front
 from dess.analysis.study.stopping import Text
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text

@@ -23,26 +23,17 @@ from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import LEVEL, by_replication, share_interval
-from dess.analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, SEEN_ABOVE, SEEN_BELOW
+from dess.analysis.stats.verdict import BETTER, INCONCLUSIVE, SEEN_BETTER, SEEN_WORSE, WORSE
 from dess.base.errors import unknown_name
 
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
 _ROUNDING = 1e-12  # the largest difference between equal results
 EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
-AHEAD, BEHIND = "ahead", "behind"
-SEEN_AHEAD, SEEN_BEHIND = "ahead in what was seen", "behind in what was seen"
-VERDICTS = {
-    ABOVE: AHEAD,
-    SEEN_ABOVE: SEEN_AHEAD,
-    INCONCLUSIVE: INCONCLUSIVE,
-    SEEN_BELOW: SEEN_BEHIND,
-    BELOW: BEHIND,
-}
 COLOURS = {
-    AHEAD: style.BETTER,
-    SEEN_AHEAD: style.BETTER,
-    BEHIND: style.WORSE,
-    SEEN_BEHIND: style.WORSE,
+    BETTER: style.BETTER,
+    SEEN_BETTER: style.BETTER,
+    WORSE: style.WORSE,
+    SEEN_WORSE: style.WORSE,
     INCONCLUSIVE: style.MUTED,
 }
 
@@ -176,12 +167,12 @@ def _plot_distribution(values: np.ndarray, pair: Pair) -> Figure:
     x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
     y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
     with style.new_panels(3.9) as (figure, ax):
-        for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
+        for start, end, outcome in ((x[0], 0, WORSE), (0, x[-1], BETTER)):
             ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
         ax.fill_between(x, *band, step="post", **style.band(style.INK), gid="band")
         ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
-        shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
+        shares = {WORSE: (values < 0).mean(), BETTER: (values > 0).mean()}
         for place, (outcome, share) in enumerate(shares.items()):
             ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (place, 1.03),
                         ha=("left", "right")[place], xycoords="axes fraction",

@@ -8,22 +8,22 @@ import scipy
 from matplotlib.figure import Figure
 
 from dess.analysis import numbers
-from dess.analysis.answers.policies.pairs import (
-    AHEAD,
-    BEHIND,
-    COLOURS,
-    OF_BASELINE,
-    SEEN_AHEAD,
-    SEEN_BEHIND,
-    VERDICTS,
-    Pair,
-)
+from dess.analysis.answers.policies.pairs import COLOURS, OF_BASELINE, Pair
 from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import PARAMETERS, field_named, value_text
 from dess.analysis.stats.differences import add_adjusted, compare_pairs, for_choice
 from dess.analysis.stats.intervals import values_within
-from dess.analysis.stats.verdict import INCONCLUSIVE, NOT_RULED_OUT, judge_by_tests
+from dess.analysis.stats.verdict import (
+    BETTER,
+    INCONCLUSIVE,
+    NOT_RULED_OUT,
+    SEEN_BETTER,
+    SEEN_WORSE,
+    WORSE,
+    better_or_worse,
+    judge_by_tests,
+)
 
 BINS = 5  # largest number of bins of a parameter
 LEAST = 10  # missions of a bin that is shown
@@ -80,7 +80,7 @@ def differences_along_parameters(missions: pd.DataFrame, candidates: int = 1) ->
     ends = ["difference", "low", "high", "p", "n", "student", "p_student"]
     table = pd.DataFrame(rows, columns=["field", "position", "value", *ends])
     table = for_choice(add_adjusted(table, "holm"), candidates)
-    verdicts = [VERDICTS[verdict] for verdict in judge_by_tests(table)]
+    verdicts = [better_or_worse(side, PRODUCT) for side in judge_by_tests(table)]
     return table.rename(columns={"difference": "mean"}).assign(verdict=verdicts)
 
 
@@ -92,10 +92,10 @@ def colours_in_words(lead: pd.DataFrame, pair: Pair) -> str:
         pair: The policies.
     """
     meanings = {
-        AHEAD: f"{pair.policy} is ahead where a dot is blue",
-        BEHIND: f"{pair.policy} is behind where a dot is orange",
-        SEEN_AHEAD: f"a hollow blue dot is ahead in what was seen, where {NOT_RULED_OUT}",
-        SEEN_BEHIND: f"a hollow orange dot is behind in what was seen, where {NOT_RULED_OUT}",
+        BETTER: f"{pair.policy} is better where a dot is blue",
+        WORSE: f"{pair.policy} is worse where a dot is orange",
+        SEEN_BETTER: f"a hollow blue dot is better in what was seen, where {NOT_RULED_OUT}",
+        SEEN_WORSE: f"a hollow orange dot is worse in what was seen, where {NOT_RULED_OUT}",
         INCONCLUSIVE: "a hollow grey dot is inconclusive",
     }
     shown = [words for verdict, words in meanings.items() if verdict in {*lead["verdict"]}]
@@ -134,7 +134,7 @@ def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
-            if verdict in (AHEAD, BEHIND):
+            if verdict in (BETTER, WORSE):
                 fillstyle = "full"
             else:
                 fillstyle = "none"

@@ -25,6 +25,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.alternatives import judge_alternatives, may_lead
 from dess.analysis.stats.intervals import (
     Interval,
     by_replication,
@@ -32,7 +33,6 @@ from dess.analysis.stats.intervals import (
     level_after,
     stratified_interval,
 )
-from dess.analysis.stats.verdict import judge_alternatives, may_lead
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -60,8 +60,8 @@ def average_over_others(
         A row per policy and combination, in the order of the study: ``policy``, the fields,
         ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` (number of points that
         the mean is taken over), ``standing``: how the combination compares with the others of this
-        policy (``stats.verdict.judge_alternatives``), and ``tied``: whether it may be the best by
-        what was seen.
+        policy (``stats.alternatives.judge_alternatives``), and ``tied``: whether it may be the best
+        by what was seen.
 
     Raises:
         InputError: If there is no such field, metric or policy.

@@ -42,6 +42,7 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
+from dess.analysis.stats.alternatives import judge_alternatives, may_lead
 from dess.analysis.stats.intervals import (
     by_replication,
     column_intervals,
@@ -54,8 +55,6 @@ from dess.analysis.stats.verdict import (
     SEEN_BELOW,
     SEEN_WORSE,
     WORSE,
-    judge_alternatives,
-    may_lead,
 )
 from dess.analysis.tables import (
     MOST_PRINTED,
@@ -236,7 +235,7 @@ def rank_settings(
         A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
         every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
         ``dess.analysis.summary``, which allow for a search), ``n`` missions, ``standing``: how the
-        setting compares with the others (``stats.verdict.judge_alternatives``), and ``tied``:
+        setting compares with the others (``stats.alternatives.judge_alternatives``), and ``tied``:
         whether it may be the best by what was seen. Where a study selects, its selected settings
         come first, and those that it has ruled out are worse. Settings of different numbers of
         missions are ranked by their differences from the first on common replications. Of equal

@@ -21,8 +21,11 @@ results = "../../results"  # folder with the results folder of the study age
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
 from dess.analysis.metrics import AGE, RATIO, metric_of
-from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/age")
@@ -31,10 +34,10 @@ against = "the number of UAVs, by arrival rate"
 lead, *others = operations.draw_means(means, "uavs", "arrival_rate", "policy", against).values()
 
 # %%
-html.make_answer(operations.age_sentence(study))
+make_answer(operations.age_sentence(study))
 
 # %%
-html.lead_figure(*lead)
+lead_figure(*lead)
 
 # %%
 page.make_panel_of(study, AGE)
@@ -47,7 +50,7 @@ page.make_panel_of(study, AGE)
 # the peak age may be lower than the mean.
 
 # %%
-html.make_gallery(others)
+make_gallery(others)
 
 # %% [markdown]
 # ## How far to trust it
@@ -55,17 +58,17 @@ html.make_gallery(others)
 # Another model differs in scenario, channel and trajectories: only the size of the effect compares.
 
 # %%
-html.write_markdown(
+write_markdown(
     "Mathematics 13(21) 3564 reports, for another model, {published}.",
     published=operations.published_age_in_words(),
 )
 
 # %%
 change = operations.age_changes(study)
-html.write_markdown("{why}", why=operations.allowance_in_words(change, "the age"))
+write_markdown("{why}", why=operations.allowance_in_words(change, "the age"))
 
 # %%
-html.make_table(
+make_table(
     tables.estimate_cells(
         change, ["policy", "uavs", "n"], "arrival_rate", operations.format_relative_change
     ),
@@ -78,7 +81,7 @@ html.make_table(
 
 # %%
 of_age = means[means["metric"] == AGE]
-html.make_table(
+make_table(
     tables.estimate_cells(
         of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.format_quantities
     ),
@@ -95,7 +98,7 @@ html.make_table(
 # `age` their age.
 
 # %%
-html.write_markdown("{lengths}", lengths=operations.mission_lengths_sentence(study))
+write_markdown("{lengths}", lengths=operations.mission_lengths_sentence(study))
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

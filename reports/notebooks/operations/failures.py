@@ -24,8 +24,11 @@ from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
-from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/failures")
@@ -39,10 +42,10 @@ against = "the failure rate, by number of UAVs"
 lead, *others = operations.draw_means(means, rate, "uavs", repair, against).values()
 
 # %%
-html.make_answer(operations.failures_sentence(study))
+make_answer(operations.failures_sentence(study))
 
 # %%
-html.lead_figure(*lead)
+lead_figure(*lead)
 
 # %%
 page.make_panel_of(study, PRODUCT)
@@ -55,10 +58,10 @@ page.make_panel_of(study, PRODUCT)
 # for it.
 
 # %%
-html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
+write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
-html.make_gallery(others)
+make_gallery(others)
 
 # %% [markdown]
 # ## How far to trust it
@@ -68,7 +71,7 @@ html.make_gallery(others)
 # %%
 display(
     *(
-        html.make_table(
+        make_table(
             tables.estimate_cells(
                 change, ["policy", "uavs", repair, "n"], rate, numbers.format_points
             ),
@@ -86,7 +89,7 @@ display(
 # %%
 display(
     *(
-        html.make_table(
+        make_table(
             tables.estimate_cells(
                 rows, ["policy", "uavs", repair, "n"], rate, numbers.format_quantities
             ),
@@ -104,4 +107,4 @@ display(
 # is lost, or grounded and repaired after a random time.
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

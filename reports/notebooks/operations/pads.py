@@ -25,8 +25,11 @@ from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import operations
 from dess.analysis.answers.settings.home import way_home_range_sentence
 from dess.analysis.metrics import PRODUCT, SUCCESS, metric_of
-from dess.reports.pages import html
 from dess.reports.pages import study as page
+from dess.reports.pages.markdown import escape_sentences, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_figure, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/pads")
@@ -36,10 +39,10 @@ against = "the number of pads, by number of UAVs"
 drawn = operations.draw_means(means, "pads", "uavs", "policy", against, linked=True)
 
 # %%
-html.make_answer(operations.enough_pads_sentence(study, margin))
+make_answer(operations.enough_pads_sentence(study, margin))
 
 # %%
-html.lead_figure(*drawn[PRODUCT])
+lead_figure(*drawn[PRODUCT])
 
 # %%
 page.make_panel_of(study, PRODUCT)
@@ -51,22 +54,22 @@ page.make_panel_of(study, PRODUCT)
 # return guard plans for waits and sends UAVs home earlier. What the fewest pads cost:
 
 # %%
-html.write_markdown("{lines}", lines=html.escape_sentences(operations.few_pads_sentence(study)))
+write_markdown("{lines}", lines=escape_sentences(operations.few_pads_sentence(study)))
 
 # %%
-html.write_markdown("{sentence}", sentence=way_home_range_sentence(study))
+write_markdown("{sentence}", sentence=way_home_range_sentence(study))
 
 # %%
-html.make_figure(*operations.draw_queues(study, margin))
+make_figure(*operations.draw_queues(study, margin))
 
 # %%
-html.make_gallery([drawn[metric] for metric in (*uses, SUCCESS)])
+make_gallery([drawn[metric] for metric in (*uses, SUCCESS)])
 
 # %% [markdown]
 # ## How far to trust it
 
 # %%
-html.write_markdown(
+write_markdown(
     "Pads are enough if the interval of the loss against a pad for every UAV is above −{margin}, "
     "here and with more pads. They are too few if it is below −{margin}. Between the two, more "
     "missions or other numbers of pads would decide.",
@@ -75,10 +78,10 @@ html.write_markdown(
 
 # %%
 lost = operations.changes_from_reference(study, "pads", study.missions["pads"].max(), PRODUCT)
-html.write_markdown("{why}", why=operations.allowance_in_words(lost, "the product"))
+write_markdown("{why}", why=operations.allowance_in_words(lost, "the product"))
 
 # %%
-html.make_table(
+make_table(
     tables.estimate_cells(lost, ["policy", "pads", "n"], "uavs", numbers.format_points),
     "Product minus that with the most pads: paired differences in points, by number of UAVs",
     data=lost,
@@ -90,7 +93,7 @@ html.make_table(
 # %%
 display(
     *(
-        html.make_table(
+        make_table(
             tables.estimate_cells(rows, ["policy", "pads", "n"], "uavs", metric_of(metric).written),
             f"{metric_of(metric).label}, by number of UAVs",
         )
@@ -109,4 +112,4 @@ display(
 # the time of the mission.
 
 # %%
-html.provenance_table([study])
+provenance_table([study])

@@ -37,7 +37,10 @@ from dess.analysis.answers.policies.parameter_bins import (
 )
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.comparison import plot_gaps
-from dess.reports.pages import html
+from dess.reports.pages.markdown import escape_sentences, write_markdown
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study, bounded = (load_results(f"{results}/{name}") for name in ("planning", "gap"))
@@ -49,30 +52,28 @@ missions = pair_missions(study, pair)
 logged = study.manifest["study"]["logged"]
 
 # %%
-html.make_answer(*answers.planner_sentences(differences, planner))
+make_answer(*answers.planner_sentences(differences, planner))
 
 # %%
-html.lead_figure(*answers.by_fleet(differences))
+lead_figure(*answers.by_fleet(differences))
 
 # %% [markdown]
 # ## Why: where each of them is ahead
 
 # %%
 lead = differences_along_parameters(missions, pair.candidates)
-html.write_markdown("{colours}", colours=colours_in_words(lead, pair))
+write_markdown("{colours}", colours=colours_in_words(lead, pair))
 
 # %%
-too_few = html.write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
-html.show_parts(
-    draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few
-)
+too_few = write_markdown("Too few missions for bins of n = {least} or more.", least=LEAST)
+show_parts(draw_differences_along_parameters(missions, lead, pair, f"{pair.title}, ") or too_few)
 
 # %%
-html.make_gallery(answers.draw_coverage(study, planner, learner))
+make_gallery(answers.draw_coverage(study, planner, learner))
 
 # %%
 mission = answers.first_logged_mission(study, planner)
-html.make_gallery(
+make_gallery(
     [
         answers.at_home(study, [planner, learner]),
         answers.draw_plan(study, mission),
@@ -87,9 +88,9 @@ html.make_gallery(
 # possible policy is between the best one here and this bound.
 
 # %%
-html.write_markdown(
+write_markdown(
     "{gap} {weights} {why}",
-    gap=html.escape_sentences(optimality.in_words(bounded, planners[-1])),
+    gap=escape_sentences(optimality.in_words(bounded, planners[-1])),
     weights=summary.weights_in_words(study),
     why=summary.allowance_for_difference(
         differences[differences["uavs"] == optimality.ALL], "policy"
@@ -107,14 +108,14 @@ if len(useful := optimality.fleets_with_useful_bound(bounds)):
         f"n = {numbers.format_span(useful['n'])} missions. The band is the interval of the bound."
     )
     drawn.append(Drawing(plot_gaps(useful), alt, counted))
-html.make_gallery(drawn, "Bars are 95 % intervals.")
+make_gallery(drawn, "Bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Tables
 
 # %%
 means = differences.assign(mean=differences["difference"])
-html.make_table(
+make_table(
     tables.estimate_cells(means, ["policy", "uavs", "n"], write=numbers.format_points),
     f"Paired differences from {learner} in points, with 95 % intervals",
     data=differences,
@@ -122,22 +123,22 @@ html.make_table(
 
 # %%
 caption = "Means, the upper bound, and the gap in points"
-html.make_table(optimality.fleet_bound_table(bounds), caption, data=bounds)
+make_table(optimality.fleet_bound_table(bounds), caption, data=bounds)
 
 # %%
-html.make_table(
+make_table(
     answers.return_table(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
 )
 
 # %%
-html.make_table(time_table(times), "Time of a decision for the UAVs of a mission")
+make_table(time_table(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made
 
 # %%
-html.write_markdown("{remarks}", remarks=decision_time_sentences(times, study, pair))
+write_markdown("{remarks}", remarks=decision_time_sentences(times, study, pair))
 
 # %%
-html.provenance_table([study, bounded])
+provenance_table([study, bounded])

@@ -24,7 +24,9 @@ from dess.analysis import load_results, tables
 from dess.analysis.answers import seas
 from dess.analysis.answers.policies.decision_times import read_decision_times
 from dess.analysis.metrics import METRICS, SUCCESS
-from dess.reports.pages import html
+from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 # %%
 study, landing, horizon = (
@@ -36,16 +38,16 @@ for name in (policy, reference, heuristic):
 times = read_decision_times(results, study)
 
 # %%
-html.make_answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
+make_answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))
 
 # %%
-html.lead_figure(*seas.draw_decision_time_front(study, times))
+lead_figure(*seas.draw_decision_time_front(study, times))
 
 # %% [markdown]
 # ## Why: what each family asks for
 
 # %%
-html.make_gallery(seas.by_group(study, reference))
+make_gallery(seas.by_group(study, reference))
 
 # %% [markdown]
 # ## How far to trust it
@@ -54,7 +56,7 @@ html.make_gallery(seas.by_group(study, reference))
 # seas are drawn with seeds that no training and no selection of weights has used.
 
 # %%
-html.make_table(
+make_table(
     seas.worst_seas_table(study, policy, reference),
     f"The seas on which {policy} is the farthest behind {reference}",
 )
@@ -63,7 +65,7 @@ html.make_table(
 # ## Tables
 
 # %%
-html.make_table(
+make_table(
     seas.policies_table(study, times),
     f"Every policy over all seas, and the time of a decision in batches on one core; "
     f"{seas.count_seas_in_words(study)}",
@@ -77,19 +79,19 @@ html.make_table(
 
 # %%
 counted = seas.count_seas_in_words(landing)
-html.make_table(
+make_table(
     seas.policies_table(landing, times), f"Missions with a quota that end on the ground; {counted}"
 )
 
 # %%
-html.make_table(
+make_table(
     seas.policies_table(horizon, times),
     f"Eight hours without a quota; {seas.count_seas_in_words(horizon)}",
 )
 
 # %%
 rows = seas.means_over_seas(study, "family", SUCCESS)
-html.make_table(
+make_table(
     tables.estimate_cells(rows, ["family"], "policy"),
     f"{METRICS[SUCCESS]} by family: means over seas with 95 % intervals",
     data=rows,
@@ -98,7 +100,7 @@ html.make_table(
 # %%
 gains = seas.differences_from_baseline(study, heuristic, "family")
 gains = gains.assign(mean=gains["difference"])
-html.make_table(
+make_table(
     tables.estimate_cells(gains, ["family"], "policy", tables.numbers.format_points),
     f"Points of the product more than {heuristic}, paired, with 95 % intervals",
     data=gains,
@@ -108,4 +110,4 @@ html.make_table(
 # ## How this page was made
 
 # %%
-html.provenance_table([study, landing, horizon])
+provenance_table([study, landing, horizon])

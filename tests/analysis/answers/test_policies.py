@@ -18,8 +18,6 @@ from dess.analysis.answers.policies.decision_times import (
     read_decision_times,
 )
 from dess.analysis.answers.policies.pairs import (
-    AHEAD,
-    BEHIND,
     Pair,
     compare_pair,
     draw_difference_distribution,
@@ -42,7 +40,7 @@ from dess.analysis.answers.policies.parameter_bins import (
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.names import PARAMETERS
 from dess.analysis.stats.differences import adjust_p_values
-from dess.analysis.stats.verdict import INCONCLUSIVE
+from dess.analysis.stats.verdict import BETTER, INCONCLUSIVE, WORSE
 from tests.analysis.small import grid, small_study
 
 PAIR = Pair("ours", "theirs", 1)
@@ -181,7 +179,7 @@ def test_along_a_parameter_the_difference_is_that_of_its_missions():
     assert table["field"].unique().tolist() == [*PARAMETERS]
     assert (table.groupby("field")["n"].sum() == len(missions)).all()
     by_uavs = table.query("field == 'uavs'").set_index("value")
-    assert by_uavs["verdict"].to_dict() == {"1": BEHIND, "2": INCONCLUSIVE, "3": AHEAD}
+    assert by_uavs["verdict"].to_dict() == {"1": WORSE, "2": INCONCLUSIVE, "3": BETTER}
     own = missions.query("uavs == 3")["difference"].mean()
     assert by_uavs.loc["3", "mean"] == pytest.approx(own)
     expected = np.minimum(1, 2 * adjust_p_values(table["p"].to_numpy(), "holm"))
@@ -199,10 +197,10 @@ def test_a_bin_has_ten_missions_or_more():
 def test_only_colours_that_occur_are_explained():
     ahead = differences_along_parameters(missions_of(lambda t: 0.5 + 0 * t["uavs"]))
     said = colours_in_words(ahead, PAIR)
-    assert said.startswith("By Holm's test over all bins, ours is ahead where a dot is blue. ")
+    assert said.startswith("By Holm's test over all bins, ours is better where a dot is blue. ")
     assert "orange" not in said and "hollow" not in said
     mixed = differences_along_parameters(missions_of(lambda t: 0.05 * (t["uavs"] - 2)))
-    assert "ours is behind where a dot is orange" in colours_in_words(mixed, PAIR)
+    assert "ours is worse where a dot is orange" in colours_in_words(mixed, PAIR)
 
 
 @pytest.mark.parametrize(

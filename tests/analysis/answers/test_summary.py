@@ -20,8 +20,9 @@ from dess.analysis.metrics import (
     check_ranking_metric,
 )
 from dess.analysis.results.learners import trained_policies_by_learner
+from dess.analysis.stats.alternatives import BEST, ONLY, SEEN_BEST, TIED
 from dess.analysis.stats.differences import compare
-from dess.analysis.stats.verdict import BEST, ONLY, SEEN_BEST, SEEN_WORSE, TIED, WORSE
+from dess.analysis.stats.verdict import SEEN_WORSE, WORSE
 from dess.analysis.study.design import Saltelli
 
 # Names only: nothing is simulated.
@@ -178,7 +179,7 @@ def test_it_is_said_how_means_weigh_the_numbers_of_uavs():
 
 def test_targets_are_met_by_the_lower_end():
     rows = [("a", 0, 0.9), ("a", 1, 0.89), ("b", 0, 0.95)]
-    means = pd.DataFrame(rows, columns=["policy", "point", "low"]).assign(metric=PRODUCT)
+    means = pd.DataFrame(rows, columns=["policy", "point", "low"]).assign(metric=PRODUCT, high=1.0)
     product = means.assign(metric="success", low=[0.5, 0.9, 0.9])
     table = pd.concat([means, product], ignore_index=True)
     left = summary.settings_meeting(table, {PRODUCT: 0.9})

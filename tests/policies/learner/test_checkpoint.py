@@ -14,7 +14,7 @@ from safetensors.numpy import load_file, save_file
 
 from dess import InputError
 from dess.model.state import MISSION, SENSOR, UAV
-from dess.policies.learner import trained
+from dess.policies.learner.arrays import hash_arrays, to_bytes
 from dess.policies.learner.checkpoint import load_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL
 from dess.policies.learner.dqn import DQNTraining
@@ -71,7 +71,7 @@ def _forged(file: Path, tensors: dict[str, np.ndarray | None] | None = None, **h
     with safe_open(file, "np") as opened:
         new = json.loads(opened.metadata()["dess"]) | header
     del new["sha256"]
-    new["sha256"] = trained.hash_arrays(new, kept)
+    new["sha256"] = hash_arrays(new, kept)
     save_file(kept, file, {"dess": json.dumps(new)})
 
 
@@ -123,7 +123,7 @@ def _forgeries(file: Path) -> Iterator[tuple[str, np.ndarray | None]]:
         for field, value in fields.items():
             records = whole[name].copy().view(dtype)
             records[:1][field] = value
-            yield name, trained.to_bytes(records)
+            yield name, to_bytes(records)
 
 
 def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
@@ -132,7 +132,7 @@ def test_a_checkpoint_has_no_bytes_of_undefined_memory(training):
     for name in padded.names:
         records[name] = 0
     assert records.tobytes().strip(b"\0")  # what lies between the fields
-    assert not trained.to_bytes(records).any()
+    assert not to_bytes(records).any()
 
 
 def test_an_index_that_the_scenario_has_not_is_refused(training, file):

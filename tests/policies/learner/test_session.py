@@ -18,12 +18,13 @@ from numba.core import serialize
 from dess import policies
 from dess.base.signals import ENDING
 from dess.policies.learner import session
+from dess.policies.learner.arrays import hash_arrays
 from dess.policies.learner.checkpoint import load_training
 from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import make_network, to_arrays
 from dess.policies.learner.session import CURVE, LOCK, choose_device, train
-from dess.policies.learner.trained import hash_arrays, make_observation, read_weights
+from dess.policies.learner.trained import make_observation, read_weights
 from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (

@@ -10,8 +10,8 @@ from dess.analysis.answers.diff import at_hand
 from dess.analysis.results.resimulate import Evidence
 from dess.analysis.results.tables import load_results
 from dess.reports.cli import main
-from dess.reports.pages import html
 from dess.reports.pages.page import Page
+from dess.reports.pages.provenance import evidence_tables
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
 
@@ -48,7 +48,7 @@ def stranger(sound, tmp_path, monkeypatch):
 def page_of(*evidence: Evidence) -> str:
     """A page with nothing but evidence, whose checksum is right."""
     seal = '<meta name="dess-checksum" content="">'
-    return Page(seal + html.evidence_tables(evidence).data).sealed.text
+    return Page(seal + evidence_tables(evidence).data).sealed.text
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> str:

@@ -8,11 +8,11 @@ from IPython.display import HTML, DisplayObject
 from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from dess.reports.pages import html
 from dess.reports.pages.body import FOLDED, TERMS, make_page
-from dess.reports.pages.html import PART, Part
 from dess.reports.pages.notebook import Report
 from dess.reports.pages.page import Page
+from dess.reports.pages.parts import PART, Part, make_answer, make_figure, make_gallery
+from dess.reports.pages.tables import make_table
 
 
 def page(*cells: str | DisplayObject) -> Page:
@@ -37,15 +37,15 @@ def main_of(*cells: str | DisplayObject) -> str:
 
 
 def figure() -> Part:
-    return html.make_figure(Figure(figsize=(1, 1)), "a", "n = 3.")
+    return make_figure(Figure(figsize=(1, 1)), "a", "n = 3.")
 
 
 def gallery() -> Part:
-    return html.make_gallery([(Figure(figsize=(1, 1)), "a", "n = 4.")] * 2, "A note.")
+    return make_gallery([(Figure(figsize=(1, 1)), "a", "n = 4.")] * 2, "A note.")
 
 
 def test_the_answer_stands_in_the_header_and_on_the_card():
-    found = page("text", html.make_answer("The **product** is 4 % & more.", "4 %"))
+    found = page("text", make_answer("The **product** is 4 % & more.", "4 %"))
     meaning = TERMS["product"]
     explained = f'<a class="term" href="#term-product" title="{meaning}">product</a>'
     assert f'<p class="lead">The {explained} is 4 % &amp; more.</p>' in found.text
@@ -104,7 +104,7 @@ def test_no_link_contains_another():
 
 def test_numbers_stand_on_their_decimal_points_and_intervals_do_not_break():
     means = ["100.0 % [99.1, 100.0]", "8.5 % [8, 9] ▲", "1,000", "none", "−8.5"]
-    shown = html.make_table(pd.DataFrame({"policy": ["a"] * 5, "mean": means})).data
+    shown = make_table(pd.DataFrame({"policy": ["a"] * 5, "mean": means})).data
     indents = [style or "0" for style in re.findall('<td(?: style="--indent:([\\d.]+)")?>', shown)]
     assert indents[1::2] == ["1.5", "3.5", "0", "0", "2.5"]
     assert "8.5\xa0% [8,\xa09]\xa0▲" in shown
@@ -118,6 +118,6 @@ def test_thresholds_have_indices_but_in_code():
 
 def test_a_cell_of_sentences_has_a_wide_column_and_keeps_intervals_together():
     cells = {"mean": ["97.4 % [96.5, 97.7]"], "guarantee": ["it is the best. " * 12]}
-    shown = html.make_table(pd.DataFrame(cells), wrap=True).data
+    shown = make_table(pd.DataFrame(cells), wrap=True).data
     assert "<td>97.4\xa0% [96.5,\xa097.7]</td>" in shown
     assert shown.count('<td class="long">it is the best. it') == 1

@@ -12,8 +12,9 @@ from nbconvert.filters import markdown2html
 
 from dess.analysis import load_results, numbers
 from dess.analysis.figures import style
-from dess.reports.pages import html
+from dess.reports.pages.figures import encode_figure
 from dess.reports.pages.index import add_bars, find_pages, make_index, render_example
+from dess.reports.pages.markdown import command_block, escape_sentences, format_code, write_markdown
 from dess.reports.pages.notebook import assigned_values, replace_values
 from dess.reports.pages.page import CARD, Page
 from dess.reports.pages.render import render_study
@@ -102,12 +103,12 @@ def test_the_index_takes_no_markup_from_a_forged_page(page, tmp_path):
 def test_a_name_in_markdown_is_text(name):
     line = " ".join(name.split())
     shown = markdown2html(
-        html.write_markdown("A {name} and {code}.", name=name, code=html.format_code(name)).data
+        write_markdown("A {name} and {code}.", name=name, code=format_code(name)).data
     )
     assert {*re.findall("<[^>]*>", shown)} == {"<p>", "</p>", "<code>", "</code>"}
     assert unescape(re.sub("<[^>]*>", "", shown)).strip() == f"A {line} and {line}."
     assert (
-        unescape(markdown2html(html.write_markdown("{name}", name=name).data)).strip()
+        unescape(markdown2html(write_markdown("{name}", name=name).data)).strip()
         == f"<p>{line}</p>"
     )
 
@@ -116,14 +117,14 @@ def test_a_name_in_markdown_is_text(name):
 def test_composed_markdown_has_neither_html_nor_links(name):
     line = " ".join(name.split())
     shown = markdown2html(
-        html.write_markdown("{text}", text=html.escape_sentences(f"- **{line}**: `{line}`")).data
+        write_markdown("{text}", text=escape_sentences(f"- **{line}**: `{line}`")).data
     )
     assert "<" not in re.sub(HARMLESS, "", shown)
 
 
 def test_a_block_of_commands_cannot_be_left():
     lines = ["a", "```", "<b>", "`````"]
-    shown = markdown2html(html.write_markdown("{lines}", lines=html.command_block(lines)).data)
+    shown = markdown2html(write_markdown("{lines}", lines=command_block(lines)).data)
     assert shown.count("<pre>") == 1
     assert unescape(re.sub("<[^>]*>", "", shown)).split() == lines
 
@@ -133,7 +134,7 @@ def test_a_name_is_no_formula_in_a_figure(name):
     with style.new_panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
-    assert html.encode_figure(drawing, "svg")
+    assert encode_figure(drawing, "svg")
     assert mpl.rcParams["text.parse_math"]
 
 

@@ -14,9 +14,9 @@ import pytest
 from playwright.sync_api import Page as Tab
 
 from dess import InputError, load_scenario, policies, simulate_batch
-from dess.analysis.answers.fleet.requirements import Requirement
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
 from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.requirement import Requirement
 from dess.analysis.stats.sequences import (
     add_values,
     ends_of_what_was_seen,
@@ -36,7 +36,6 @@ from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import index
 from dess.reports.pages import panel as panels
-from dess.reports.pages.html import fill_page
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import (
@@ -47,6 +46,7 @@ from dess.reports.pages.panel import (
     make_another,
     make_panel,
 )
+from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
@@ -516,7 +516,7 @@ def test_a_requirement_is_judged_by_the_intervals(visit, document):
     for bound in (ends[0][0] - 1, sum(ends[0]) / 2, ends[0][1] + 1, ends[1][1] + 1):
         tab.locator("[name=bound-0]").fill(str(bound))
         words = [
-            "meets" if low > bound else "misses" if high < bound else "open" for low, high in ends
+            "met" if low > bound else "missed" if high < bound else "open" for low, high in ends
         ]
         marks = tab.locator("[data-panel=verdicts] strong").all_text_contents()
         assert marks == words
@@ -575,9 +575,9 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
     grid = grid_of(tab)
     assert {fleet: look for fleet, (look, _) in grid.items()} == {
-        (1, 1): "misses",
-        (1, 4): "misses",
-        (2, 1): "meets cheapest",
+        (1, 1): "missed",
+        (1, 4): "missed",
+        (2, 1): "met cheapest",
         (2, 4): "open",  # it costs more than one that meets the requirements
     }
     assert "30 missions" in grid[2, 4][1]
@@ -607,7 +607,7 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     assert lines[1] == f"# {command}"
     assert len(lines) == 3 + len(grid)
     looks = {fleet: look for fleet, (look, _) in grid_of(tab).items()}
-    assert (looks[1, 1], looks[2, 1]) == ("open", "meets leading")
+    assert (looks[1, 1], looks[2, 1]) == ("open", "met leading")
     tab.locator("[name=bound-0]").fill("20")
     assert "The cheapest is 1 UAV, 1 pad for 1,300 EUR" in str(status.text_content())
     tab.locator("[name=a-max_slots]").press("Home")

@@ -51,7 +51,9 @@ from matplotlib.figure import Figure
 
 from dess.analysis import load_results
 from dess import InputError
-from dess.reports.pages import html
+from dess.reports.pages.parts import make_figure
+from dess.reports.pages.provenance import provenance_table
+from dess.reports.pages.tables import make_table
 
 study = load_results(Path(results) / "trial")
 if policy not in study.policies:
@@ -62,15 +64,15 @@ if policy not in study.policies:
 
 # %%
 print("a warning", file=sys.stderr)
-html.make_table(study.missions.head(3))
+make_table(study.missions.head(3))
 
 # %%
 drawing = Figure(figsize=(4, 3))
 drawing.subplots().plot(study.missions["slots"])
-html.make_figure(drawing, "slots", "Slots of every mission, n = 10.")
+make_figure(drawing, "slots", "Slots of every mission, n = 10.")
 
 # %%
-html.provenance_table([study])
+provenance_table([study])
 """
 SCORECARD = HEAD.format("", "Scorecard", "The claims.")
 SCORECARD += """# %%

@@ -18,11 +18,18 @@ from dess.analysis.results.resimulate import Evidence, learned_files
 from dess.analysis.results.tables import load_results
 from dess.policies.registry import TRAINED
 from dess.reports.cli import main
-from dess.reports.pages import html, verify
+from dess.reports.pages import verify
 from dess.reports.pages.body import make_page
 from dess.reports.pages.index import find_pages, make_index
 from dess.reports.pages.notebook import read_report
 from dess.reports.pages.page import STUDY, Page
+from dess.reports.pages.provenance import (
+    STUDIES_BESIDE,
+    evidence_tables,
+    provenance_table,
+    weights_table,
+)
+from dess.reports.pages.tables import make_table
 from dess.reports.pages.verify import verify_page, verify_results
 from tests.analysis.hostile import forged
 from tests.analysis.small import small_study
@@ -45,8 +52,8 @@ def results(tmp_path_factory):
 def page(results, tmp_path_factory):
     """A page on both, with the index of its folder; its notebook has not been run."""
     out = tmp_path_factory.mktemp("out")
-    shown = html.make_table(pd.DataFrame({"Success": ["97.3 %"]}))
-    origins = html.provenance_table([load_results(results / name) for name in ("table4", "fig4")])
+    shown = make_table(pd.DataFrame({"Success": ["97.3 %"]}))
+    origins = provenance_table([load_results(results / name) for name in ("table4", "fig4")])
     report, data = read_report("performance"), {"text/html": shown.data + origins.data}
     report.cells[-1].outputs = [new_output("display_data", data)]
     (out / "performance.html").write_text(make_page(report).text, "utf-8")
@@ -80,7 +87,7 @@ def test_pages_and_results_that_nobody_altered_agree(results, page):
 def test_the_origins_of_many_studies_stand_in_several_tables(results):
     """So that no column is beyond the edge of a page."""
     evidence = Evidence.of(load_results(results / "fig4"))
-    shown = html.evidence_tables([evidence] * (html.STUDIES_BESIDE + 1)).data
+    shown = evidence_tables([evidence] * (STUDIES_BESIDE + 1)).data
     assert shown.count("<table") == 2
     assert len(Page(shown).evidence) == 1  # of the same study
 
@@ -166,7 +173,7 @@ def test_an_incomplete_folder_hides_no_other(results, tmp_path):
 
 def test_other_weights_are_found(tmp_path, capsys):
     folder = shutil.copytree(TRAINED, tmp_path / "trained")
-    content = f'<meta name="dess-checksum" content="">{html.weights_table(folder).data}'
+    content = f'<meta name="dess-checksum" content="">{weights_table(folder).data}'
     path = tmp_path / "page.html"
     path.write_text(Page(content).sealed.text, "utf-8")
     assert lines_of(path) == []

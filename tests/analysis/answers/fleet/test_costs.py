@@ -10,8 +10,8 @@ from dess.analysis.answers.fleet.costs import (
     priced_settings,
 )
 from dess.analysis.metrics import metric_in_missions
+from dess.analysis.stats.front import on_front
 from dess.analysis.stats.intervals import interval_of
-from dess.analysis.stats.verdict import on_front
 from dess.analysis.study.prices import Costs, most_battery_per_slot
 from tests.analysis.small import SCENARIO, SHEET
 

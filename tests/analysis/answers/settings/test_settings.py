@@ -23,7 +23,8 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.answers.settings.ranking import best_settings_sentence, rank_settings
 from dess.analysis.metrics import METRICS, PRODUCT
-from dess.analysis.stats.verdict import BEST, SEEN_BEST, SEEN_WORSE, TIED, WORSE, may_be_best
+from dess.analysis.stats.alternatives import BEST, SEEN_BEST, TIED, may_be_best
+from dess.analysis.stats.verdict import SEEN_WORSE, WORSE
 from dess.reports import cli
 from tests.analysis.small import grid
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis import load_results
-from dess.reports.pages import html
+from dess.reports.pages.downloads import format_latex
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render_study
 from tests.analysis.small import files_of, grid
@@ -107,7 +107,7 @@ def test_it_requests_nothing_and_fits_a_phone(page, out, visit):
 
 def test_latex_has_what_the_table_has_and_no_letter_that_it_lacks():
     frame = pd.DataFrame({"C_S [%]": ["5–7", "−1 & ▲"], "a_b": [1 / 3, float("nan")]})
-    assert html.format_latex(frame).split("\n")[2:6] == [
+    assert format_latex(frame).split("\n")[2:6] == [
         r"$C_S$ [\%] & a\_b \\",
         r"\midrule",
         r"5--7 & 0.333333 \\",
