@@ -61,8 +61,8 @@ class Field:
         """A value in words: ``3 UAVs``, ``failed UAVs lost for good``, ``arrival rate 0.02``."""
         text = value_text(value)
         if self.key in _NO_REPAIR:
-            things, fate = _NO_REPAIR[self.key]
-            return f"failed {things} {f'repaired in {text} slots' if value else fate}"
+            things, otherwise = _NO_REPAIR[self.key]
+            return f"failed {things} {f'repaired in {text} slots' if value else otherwise}"
         if self.counted:
             return f"{text} {self.counted}{'' if text == '1' else 's'}"
         return f"{self.within} {text}"

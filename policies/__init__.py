@@ -1,8 +1,10 @@
 """Policies: heuristics, the return guard, the learned policy, and policies of other packages.
 
-policy = dess.policies.load("greedy")      # by name, or the folder of a trained policy
-team = dess.policies.load_team("ddqn,tour")
-actions = policy.act(view)
+    >>> policy = dess.policies.load("greedy")      # by name, or the folder of a trained policy
+    >>> [policy.name for policy in dess.policies.load_team("ddqn,tour")]
+    ['ddqn', 'tour']
+
+``policy.act(view)`` gives the actions of the UAVs in a view.
 """
 
 from pathlib import Path

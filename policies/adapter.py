@@ -2,7 +2,7 @@
 
 class Mine(Adapter):   # in my_policies.py, for dess evaluate --policy my_policies.py:Mine
     def __init__(self):
-        super().__init__("mine", load_network(FILE), guarded=True, weights=FILE)
+        super().__init__("mine", choose, guarded=True, weights=FILE)
 """
 
 from ast import literal_eval

@@ -4,7 +4,7 @@ It shows the estimates of ``answers.summary.means_of_points`` for one design poi
 can contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
 setting at which the sliders start.
 
-    explorer(load_results("results/explorer"))
+    make_explorer(load_results("results/explorer"))
 """
 
 import json
@@ -121,7 +121,7 @@ def make_explorer(results: Results) -> HTML:
     """
     grid = Grid(results)
     colours = style.policy_colours(results.policies)
-    looks = {policy: colours[policy][0] for policy in results.policies}
+    styles = {policy: colours[policy][0] for policy in results.policies}
     texts = {
         (
             row.metric,
@@ -148,7 +148,7 @@ def make_explorer(results: Results) -> HTML:
             for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
-    shown = {"fields": fields, "policies": looks, "metrics": grid.metrics, "texts": texts}
+    shown = {"fields": fields, "policies": styles, "metrics": grid.metrics, "texts": texts}
     return render_part("explorer.html", data=data, **shown)
 
 

@@ -3,8 +3,8 @@
 A page contains ``player_script()`` once, before its first ``make_player``; then it needs no
 network. What is drawn is in ``templates/player.js``.
 
-    display(library())
-    display(player([Shown(log, scenario, "One UAV")], "player-1"))
+    display(player_script())
+    display(make_player([Shown(log, scenario, "One UAV")], "player-1"))
 
 Without JavaScript, and on paper, a player is a map with the paths of the UAVs.
 

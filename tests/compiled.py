@@ -95,15 +95,14 @@ def _plan_pads(mission, uavs, i, data, chart, plan, reach):
 
 def spread_out(prices, zones, cells):
     """The zones of UAVs that were in the best zone for each, as the matching changes them."""
-    turns = np.zeros(len(zones), queues.TURN)
-    turns["zone"] = zones
-    _spread_out(prices, turns, cells - np.bincount(zones, minlength=len(cells)))
-    return turns["zone"]
+    places = zones.copy()
+    _spread_out(prices, places, cells - np.bincount(zones, minlength=len(cells)))
+    return places
 
 
 @kernel
-def _spread_out(prices, turns, left):
-    matching.spread_out(prices, turns, left)
+def _spread_out(prices, places, left):
+    matching.spread_out(prices, places, left)
 
 
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):

@@ -287,6 +287,28 @@ def test_the_columns_of_records_and_events_are_all_explained():
         assert f"`{name}`" in text, name
 
 
+ARCHITECTURE = PAGES["docs/architecture.md"]
+
+
+def test_the_places_of_the_architecture_page_exist():
+    """A place is a path from the root of the repository, with the name in it after a colon."""
+    last = ""
+    places = re.findall(r"`([\w./-]*/[\w./-]*)?(?::(\w+))?`", ARCHITECTURE)
+    assert sum(bool(path) for path, _ in places) > 100
+    for path, name in places:
+        last = path or last
+        assert (ROOT / last).exists(), last
+        if name:
+            assert re.search(rf"\b{name}\b", (ROOT / last).read_text("utf-8")), f"{last}:{name}"
+
+
+def test_the_architecture_page_stays_short():
+    prose = re.sub(r"`[^`]*`|\|", " ", ARCHITECTURE)
+    assert len(prose.split()) <= 1500
+    for row in re.findall(r"^\| .*$", prose, re.M):
+        assert len(row.split()) <= 25, row
+
+
 # --- snippets ---
 
 

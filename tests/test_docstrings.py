@@ -1,19 +1,40 @@
-"""Docstrings name only what there is: every dotted name in backquotes is found in the sources."""
+"""Docstrings name only what there is, and their examples run.
+
+Every name in backquotes is found in the sources, and so is every function that an example calls.
+Examples with ``>>>`` are run, and print what they say.
+"""
 
 import ast
+import builtins
+import doctest
+import keyword
 import re
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
+from typing import Any
 
+import numpy as np
 import pytest
 
+import dess
 from dess.scenario.scenario import Scenario
 from tests.test_architecture import LIBRARY, SOURCES
 
+NAME = re.compile(r"``([A-Za-z_]\w*)(?:\([^`]*\))?``")
+# What a phrase says is made by a function, or returned by one.
+MADE = re.compile(r"(?:[Rr]ows?|[Rr]esults?) of ``([a-z]\w*)``|as ``([a-z]\w*)`` returns")
 DOTTED = re.compile(r"``([A-Za-z_]\w+(?:\.[A-Za-z_]\w*)+)(?:\(\))?``")
 FILES = {"css", "html", "json", "md", "py", "safetensors", "toml"}  # endings of names of files
 # What is not ours, and that none of our modules imports.
 FOREIGN = {"TimeLimit", "dask", "marl_eval", "rliable"}
+# Names of other libraries and of the system, which the sources have in docstrings alone.
+OTHERS = {"ActionMaskingTorchRLModule", "NextStep", "ParallelPettingZooEnv", "SameStep", "fastmath"}
+OTHERS |= {"MaskablePPO", "PPOConfig"}
+OTHERS |= {"age_h", "lots", "nohup", "parallel_collection", "set_options", "tqdm"}
+ENDS = ("_low", "_high")  # of the names of columns with the ends of intervals
+# What examples may use beside the names of their module.
+AT_HAND: dict[str, Any] = {"dess": dess, "load_scenario": dess.load_scenario, "np": np}
 
 
 def quoted(tree: ast.Module) -> Iterator[str]:
@@ -21,6 +42,61 @@ def quoted(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             yield from DOTTED.findall(str(node.value.value))
+
+
+def docstrings(tree: ast.AST) -> Iterator[tuple[ast.AST, str]]:
+    """The texts that stand alone in a module, each with what it stands in."""
+    for node in ast.walk(tree):
+        for inside in ast.iter_child_nodes(node):
+            if isinstance(inside, ast.Expr) and isinstance(inside.value, ast.Constant):
+                yield node, str(inside.value.value)
+
+
+def arguments_of(node: ast.AST) -> set[str]:
+    """The arguments of a function, or of the methods of a class."""
+    return {argument.arg for argument in ast.walk(node) if isinstance(argument, ast.arg)}
+
+
+@cache
+def made_names() -> set[str]:
+    """The names of all functions and classes, and of what modules and classes bind."""
+    bound: set[str] = set()
+    for module, tree in LIBRARY.items():
+        bound |= bound_in(module).keys()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                bound.add(node.name)
+            elif isinstance(node, ast.ClassDef):
+                bound |= {node.name} | {*dict(_bound(node.body))}
+    return bound
+
+
+@cache
+def all_names() -> set[str]:
+    """What a single name in a docstring may be: of code, or a word of a text of the code."""
+    names = made_names() | {*dir(builtins), *keyword.kwlist, *Scenario.model_fields} | OTHERS
+    for module, tree in SOURCES.items():
+        names |= {*module.split(".")}
+        texts = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                names.add(node.attr)
+            elif isinstance(node, ast.keyword):
+                names.add(str(node.arg))
+            elif isinstance(node, ast.Constant) and id(node) not in texts:
+                names |= {*re.findall(r"\w+", str(node.value))}
+    return names
+
+
+def calls_in(text: str) -> Iterator[str]:
+    """The functions that the lines of a text call by a plain name, if they are lines of code."""
+    for line in text.splitlines():
+        try:
+            nodes = [*ast.walk(ast.parse(line.strip().removeprefix(">>> ").removeprefix("... ")))]
+        except SyntaxError:  # prose
+            continue
+        calls = [node.func for node in nodes if isinstance(node, ast.Call)]
+        yield from (call.id for call in calls if isinstance(call, ast.Name))
 
 
 @cache
@@ -112,6 +188,47 @@ def is_found(name: str, module: str) -> bool:
         or any(attribute in bound_in(home) for home in homes)
         or any(has(node, attribute) for node in objects)
     )
+
+
+@pytest.mark.parametrize("module", LIBRARY)
+def test_a_name_in_prose_is_one_of_the_code(module):
+    """A local name of a function may be named in its own docstring only if it is an argument."""
+    unknown = {
+        name
+        for node, text in docstrings(SOURCES[module])
+        for name in {*NAME.findall(text)} - all_names() - arguments_of(node)
+        if not name.endswith(ENDS)
+    }
+    assert not unknown
+
+
+@pytest.mark.parametrize("module", LIBRARY)
+def test_what_is_said_to_return_rows_is_there(module):
+    found = [pair for _, text in docstrings(SOURCES[module]) for pair in MADE.findall(text)]
+    assert not {first or second for first, second in found} - made_names()
+
+
+@pytest.mark.parametrize("module", LIBRARY)
+def test_examples_call_what_there_is(module):
+    called = {name for _, text in docstrings(SOURCES[module]) for name in calls_in(text)}
+    assert not called - made_names() - foreign() - {*dir(builtins)} - OTHERS
+
+
+EXAMPLES = [m for m, tree in LIBRARY.items() if any(">>> " in t for _, t in docstrings(tree))]
+
+
+@pytest.mark.parametrize("module", EXAMPLES)
+def test_examples_print_what_they_say(module, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    loaded = import_module(module)
+    found = doctest.testmod(loaded, extraglobs=AT_HAND, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert found.attempted and not found.failed
+
+
+def test_stale_examples_are_found():
+    assert [*calls_in("Some prose.\n\n    value = improve(mission, 3)\n")] == ["improve"]
+    assert MADE.findall("Rows of ``transfers``, as ``stacked`` returns them")
+    assert not {"transfers", "stacked", "improve"} & made_names()
 
 
 @pytest.mark.parametrize("module", LIBRARY)

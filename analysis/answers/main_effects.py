@@ -279,7 +279,7 @@ def plot_effect(
         on all pages.
     """
     rows = table[table["field"] == field]
-    looks = style.policy_colours(policies, changes)
+    styles = style.policy_colours(policies, changes)
     first = rows[rows["position"] == 0]
     steps = pd.concat(
         [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
@@ -289,11 +289,11 @@ def plot_effect(
     ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
     with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
         for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
-            style.plot_along(rows[rows["metric"] == metric], looks, "%", ax)
+            style.plot_along(rows[rows["metric"] == metric], styles, "%", ax)
             ax.set(
                 ylabel=fill(name, 16), ylim=style.axis_ends(table[table["metric"] == metric], 0.1)
             )
-        style.plot_along(steps, looks, "points", axes[-1])
+        style.plot_along(steps, styles, "points", axes[-1])
         axes[-1].axhline(0, **style.ZERO)
         title = f"Paired difference from the value at {first['value'].iloc[0]}"
         axes[-1].set(title=title, ylabel="percentage\npoints")
@@ -324,10 +324,10 @@ def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
     """
     rows = table[table["metric"] == PRODUCT]
     fields = [*rows["field"].unique()]
-    looks = style.policy_colours(policies, rows["policy"])
+    styles = style.policy_colours(policies, rows["policy"])
     with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
         for ax, field in zip(axes, fields, strict=True):
-            style.plot_along(rows[rows["field"] == field], looks, "%", ax)
+            style.plot_along(rows[rows["field"] == field], styles, "%", ax)
             ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
             ax.tick_params(axis="x", labelsize=8)
         figure.supylabel(metric_of(PRODUCT).label, fontsize=10)

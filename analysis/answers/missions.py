@@ -14,7 +14,7 @@ from dess.analysis.figures import Drawing
 from dess.analysis.metrics import PRODUCT, RATIO
 from dess.analysis.results import parquet
 from dess.analysis.results.event_log import Events
-from dess.analysis.results.resimulate import Mission, resimulate
+from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.intervals import summary
@@ -24,7 +24,7 @@ FOLDER = "cross-check"  # folder of missions simulated again, beside the results
 NEGLECTED = 3  # how many nodes are named of which the least is collected
 
 
-def shared_collection_sentence(missions: Sequence[Mission]) -> str:
+def shared_collection_sentence(missions: Sequence[LoggedMission]) -> str:
     """What share of the data single missions of fleets collect, and how many UAVs run empty."""
     parts = [
         f"{numbers.format_percent(m.record[RATIO])} with {m.fleet} in {m.record.slots} slots"
@@ -41,7 +41,7 @@ def shared_collection_sentence(missions: Sequence[Mission]) -> str:
     )
 
 
-def _left_in_the_air(missions: Sequence[Mission]) -> str:
+def _left_in_the_air(missions: Sequence[LoggedMission]) -> str:
     """How many UAVs of missions end without the battery for the way home, in a sentence."""
     stranded = [f"{stranded_uavs(mission)} of {len(mission.uavs)}" for mission in missions]
     if not any(stranded_uavs(mission) for mission in missions):
@@ -52,19 +52,19 @@ def _left_in_the_air(missions: Sequence[Mission]) -> str:
     )
 
 
-def stranded_uavs(mission: Mission) -> int:
+def stranded_uavs(mission: LoggedMission) -> int:
     """How many UAVs of a mission end without the battery for the way home."""
     return int((mission.uavs["battery"] < mission.uavs["way_home"]).sum())
 
 
-_FATES = {
+_ENDS_IN_WORDS = {
     "battery": "deplete their battery",
     "lost": "are lost",
     "truncated": "run out of time",
 }
 
 
-def fate_in_words(mission: Mission) -> str:
+def end_in_words(mission: LoggedMission) -> str:
     """How the UAVs of a mission end: whether it is a success, and whether they could fly home.
 
     Args:
@@ -73,8 +73,8 @@ def fate_in_words(mission: Mission) -> str:
     ends = mission.uavs["end"].tolist()
     scenario = mission.scenario
     failures = [
-        f"{ends.count(end)} of {len(ends)} UAVs {fate}"
-        for end, fate in _FATES.items()
+        f"{ends.count(end)} of {len(ends)} UAVs {ended}"
+        for end, ended in _ENDS_IN_WORDS.items()
         if end in ends
     ]
     if failures:
@@ -88,7 +88,7 @@ def fate_in_words(mission: Mission) -> str:
     return f"{text}, but {stranded} of {len(ends)} have no battery left for the way home"
 
 
-def map_caption(mission: Mission, fleet: str) -> str:
+def map_caption(mission: LoggedMission, fleet: str) -> str:
     """The caption of the map of a mission.
 
     Args:
@@ -97,11 +97,11 @@ def map_caption(mission: Mission, fleet: str) -> str:
     """
     return (
         f"A mission with the policy {mission.policy} and {fleet}, replication "
-        f"{mission.replication}: {fate_in_words(mission)}. n = 1."
+        f"{mission.replication}: {end_in_words(mission)}. n = 1."
     )
 
 
-def neglected_sentence(mission: Mission) -> str:
+def neglected_sentence(mission: LoggedMission) -> str:
     """From which ``NEGLECTED`` nodes the least share of their data is collected, in a sentence.
 
     Args:
@@ -165,10 +165,10 @@ def keep_logs(
 
 def kept_missions(
     results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
-) -> list[Mission]:
+) -> list[LoggedMission]:
     """Those of the missions whose event logs ``keep_logs`` has stored."""
     return [
-        Mission.of(results, policy, 0, replication, log)
+        LoggedMission.of(results, policy, 0, replication, log)
         for policy, replication in wanted
         if (log := _kept_log(results, policy, replication, folder)) is not None
     ]
@@ -210,7 +210,7 @@ def estimate_metric(
     return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
 
 
-def draw_mission(mission: Mission, alt: str, caption: str) -> Drawing:
+def draw_mission(mission: LoggedMission, alt: str, caption: str) -> Drawing:
     """The map of a mission and its curves over time.
 
     Args:
@@ -223,7 +223,7 @@ def draw_mission(mission: Mission, alt: str, caption: str) -> Drawing:
     return Drawing(mission_figure(mission.events, mission.scenario), alt, caption)
 
 
-def beside_paper(results: Results, mission: Mission, printed: float) -> Drawing:
+def beside_paper(results: Results, mission: LoggedMission, printed: float) -> Drawing:
     """A mission, with the mean collection ratio of its policy and the paper's number.
 
     Args:
@@ -241,12 +241,12 @@ def beside_paper(results: Results, mission: Mission, printed: float) -> Drawing:
     return draw_mission(mission, alt, caption)
 
 
-def outcome_table(missions: Sequence[Mission]) -> pd.DataFrame:
+def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
     """A table to print with a row per mission; data are in data units."""
     return pd.DataFrame([_mission_outcome(mission) for mission in missions])
 
 
-def _mission_outcome(mission: Mission) -> dict[str, Any]:
+def _mission_outcome(mission: LoggedMission) -> dict[str, Any]:
     row, log = mission.record, mission.events
     served = log.loc[log["event"] == "communication", "node"].nunique()
     left = log[(log["event"] == "mission_end") & (log["node"] >= 0)]

@@ -144,7 +144,7 @@ def allowance_in_words(changes: pd.DataFrame, what: str) -> str:
     """Why the intervals of changes are wider than the missions alone would make them.
 
     Args:
-        changes: Rows of ``changes``, which are shares.
+        changes: Rows of ``changes_from_reference``, which are shares.
         what: What has changed, in words.
 
     Returns:

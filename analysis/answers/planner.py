@@ -21,7 +21,7 @@ from dess.analysis.figures import comparison as figures
 from dess.analysis.figures import missions as maps
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.results.event_log import uav_slots
-from dess.analysis.results.resimulate import Mission
+from dess.analysis.results.resimulate import LoggedMission
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare, difference_test, differences_of, t_test
 from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
@@ -326,14 +326,14 @@ def return_table(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=heads)
 
 
-def first_logged_mission(results: Results, policy: str) -> Mission:
+def first_logged_mission(results: Results, policy: str) -> LoggedMission:
     """The first mission of the smallest fleet whose event log is kept."""
     missions = results.missions_of(policy).set_index("replication")
     replication = int(missions.loc[[*_logged_replications(results, policy)], "uavs"].idxmin())
-    return Mission.of(results, policy, 0, replication)
+    return LoggedMission.of(results, policy, 0, replication)
 
 
-def draw_plan(results: Results, mission: Mission) -> Drawing:
+def draw_plan(results: Results, mission: LoggedMission) -> Drawing:
     """What a planner plans in the first slot of a mission, over the mission as simulated.
 
     Nothing is simulated. If the policy is no planner, no plan is drawn.

@@ -118,9 +118,9 @@ def by_group(results: Results, reference: str) -> list[Drawing]:
     for by, name in GROUPS.items():
         table = shares_of_reference(results, reference, by)
         table = table[table["policy"] != reference]
-        looks = style.policy_colours(table["policy"])
+        styles = style.policy_colours(table["policy"])
         with style.new_panels(4.2) as (figure, ax):
-            style.plot_along(style.place_values(table, by), looks, "%", ax, linestyle="")
+            style.plot_along(style.place_values(table, by), styles, "%", ax, linestyle="")
             ax.set(ylabel=f"product, share of {reference}")
         alt = f"The product as a share of that of {reference}, by {name.lower()}"
         caption = (

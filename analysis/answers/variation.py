@@ -18,7 +18,7 @@ from scipy.special import ndtri
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
-from dess.analysis.answers.missions import estimate_metric, fate_in_words
+from dess.analysis.answers.missions import end_in_words, estimate_metric
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.metrics import (
     HOME,
@@ -628,7 +628,7 @@ class Example:
         caption = (
             f"{SIDES[point].capitalize()} ({', '.join(self.variation.sides[point])}): collection "
             f"ratio {numbers.format_percent(mission.record.collection_ratio)}; "
-            f"{fate_in_words(mission)}. "
+            f"{end_in_words(mission)}. "
             f"{format_length(mission.record.slots, mission.scenario.units)}. n = 1."
         )
         return figure, "Map of the mission; battery, residual data and charging", caption

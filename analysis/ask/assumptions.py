@@ -51,10 +51,10 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         duty = f", for {duty_cycle} of the time on average, bursts left out"
     repair = given("repair", "")
     if repair:
-        fate = f"is repaired in {repair}"
+        end = f"is repaired in {repair}"
     else:
-        fate = "is lost for good"
-    failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {fate}"
+        end = "is lost for good"
+    failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {end}"
     return [
         f"Success: at the end of a mission every UAV has landed{quota}.",
         f"A slot is {printed(units.slot, 's')}, a hundredth of the endurance of "

@@ -31,7 +31,7 @@ from dess.analysis.metrics import (
     metric_in_space,
 )
 from dess.analysis.results.chunks import split_into_chunks
-from dess.analysis.results.manifest import Cell, Part
+from dess.analysis.results.manifest import Cell, CellPart
 from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
@@ -335,7 +335,7 @@ def _simulate_pieces(
 
 def _event_jobs(asked: Asked, replications: range) -> list[Job]:
     """Jobs of the event engine."""
-    chunks = split_into_chunks([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
+    chunks = split_into_chunks([CellPart(Cell(0, 0, "", 0), replications)], CHUNK["events"])
     spaces = (asked.scenario,)
     about = (asked.team, asked.seed, "events", asked.run_files)
     return [MissionsJob(chunk, spaces, *about) for chunk in chunks]

@@ -13,7 +13,7 @@ from dess import InputError, simulate, simulate_batch
 from dess.analysis.bound import Bound, upper_bound
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import Chunk
-from dess.analysis.results.manifest import Cell, Part
+from dess.analysis.results.manifest import Cell, CellPart
 from dess.analysis.results.provenance import Member, bound_code, members_of
 from dess.analysis.results.store import Store
 from dess.model.record import Records, empty_records_of
@@ -101,7 +101,7 @@ class Job(ABC):
     def alone(self) -> Iterator[Self]:
         """A job for each of the missions."""
         for space, cell, replication in self.each:
-            part = Part(cell, range(replication, replication + 1))
+            part = CellPart(cell, range(replication, replication + 1))
             yield replace(self, chunk=replace(self.chunk, parts=(part,)), spaces=(space,))
 
     @abstractmethod
@@ -206,10 +206,10 @@ class Problem:
 
     error: str
     traceback: str = ""
-    mission: Part | None = None
+    mission: CellPart | None = None
 
     @classmethod
-    def of(cls, error: Exception, mission: Part | None = None) -> Self:
+    def of(cls, error: Exception, mission: CellPart | None = None) -> Self:
         """The problem that belongs to an exception."""
         line = " ".join(traceback.format_exception_only(error)[-1].split())
         return cls(line, "".join(traceback.format_exception(error)), mission)
@@ -236,7 +236,7 @@ def attempt_job(job: Job, progress: Progress | None = None) -> Any:
         return Problem.of(error, first_failing(job, _must_fail))
 
 
-def first_failing(job: Job, fails: Callable[[Job], bool]) -> Part | None:
+def first_failing(job: Job, fails: Callable[[Job], bool]) -> CellPart | None:
     """The first mission of a job that also fails when it is simulated alone."""
     return next((single.chunk.parts[0] for single in job.alone() if fails(single)), None)
 

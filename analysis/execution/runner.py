@@ -27,7 +27,7 @@ from dess.analysis.execution.jobs import (
 )
 from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import chunks, tables
-from dess.analysis.results.manifest import Part, Selected
+from dess.analysis.results.manifest import CellPart, Selected
 from dess.analysis.results.store import Failure, Present, Store, gaps_between, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
@@ -177,7 +177,7 @@ class _Run:
         manifest = self.store.manifest
         return self.store.samples(manifest.parts_of_team(team, counts)), manifest.settings
 
-    def _round(self, parts: Sequence[Part], logs: Sequence[Part] = ()) -> None:
+    def _round(self, parts: Sequence[CellPart], logs: Sequence[CellPart] = ()) -> None:
         """Simulate the missing missions of a round with these parts, then make the event logs."""
         if self.reuse and self.store.missing("missions", parts):
             for source in self._sources:
@@ -188,7 +188,7 @@ class _Run:
     def _sources(self) -> list[Store]:
         return source_folders(self.reuse, self.store.manifest)
 
-    def _make(self, *works: tuple[type[Job], Sequence[Part]]) -> None:
+    def _make(self, *works: tuple[type[Job], Sequence[CellPart]]) -> None:
         """One kind of work after the other: find what is missing of its parts, run and store it.
 
         Raises:
@@ -206,7 +206,7 @@ class _Run:
         if failures:
             raise ChunkError(failures)
 
-    def _jobs(self, kind: type[Job], parts: Sequence[Part]) -> Iterator[Job]:
+    def _jobs(self, kind: type[Job], parts: Sequence[CellPart]) -> Iterator[Job]:
         """The jobs for what is missing of some parts, cut as if nothing were present."""
         study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
@@ -260,7 +260,7 @@ class _Run:
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 
-def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
+def new_parts(wanted: Iterable[Iterable[CellPart]], asked: Present) -> list[CellPart]:
     """The missions that are needed in addition to those asked for before, each once, in order.
 
     Args:
@@ -271,6 +271,6 @@ def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
     for part in (part for of_team in wanted for part in of_team):
         earlier = asked[part.cell.key]
         new = gaps_between(part.replications, earlier)
-        parts += [Part(part.cell, gap) for gap in new]
+        parts += [CellPart(part.cell, gap) for gap in new]
         earlier += new
     return parts

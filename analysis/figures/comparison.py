@@ -22,7 +22,7 @@ def plot_claims(table: pd.DataFrame, width: int = 60) -> Figure:
         width: The characters in a line of a name.
     """
     names = [*table["claim"].unique()]
-    looks = style.policy_colours(table["policy"])
+    styles = style.policy_colours(table["policy"])
     lines = [fill(name, width) for name in names]
     if width > max(map(len, names)):
         height = 0.3 * len(names)
@@ -30,14 +30,14 @@ def plot_claims(table: pd.DataFrame, width: int = 60) -> Figure:
         height = 0.52 * len(names)
     with style.new_panels(height, values="x", legend=5) as (figure, ax):
         for shift, (policy, rows) in zip(
-            style.side_by_side_shifts(len(looks), 0.3),
+            style.side_by_side_shifts(len(styles), 0.3),
             table.groupby("policy", sort=False),
             strict=True,
         ):
             places = rows["claim"].map(names.index) + shift
             arms = style.error_bar_arms(rows)
             ax.errorbar(rows["mean"], places, xerr=arms, linestyle="", label=policy,
-                        **style.dot_style(looks[str(policy)]))  # fmt: skip
+                        **style.dot_style(styles[str(policy)]))  # fmt: skip
         ax.axvline(0, **style.ZERO)
         ax.set_yticks(range(len(names)), lines)
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
@@ -136,8 +136,8 @@ def plot_differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure
     rows = style.place_values(rows.assign(mean=rows["difference"], name=names), "name")
     with style.new_panels(3.6, values="y") as (figure, ax):
         ax.axhline(0, **style.ZERO)
-        looks = style.policy_colours(rows["policy"])
-        style.plot_along(rows, looks, "points", ax, linestyle="")
+        styles = style.policy_colours(rows["policy"])
+        style.plot_along(rows, styles, "points", ax, linestyle="")
         ax.set(title=f"{title} (paired)", ylabel="percentage points")
         ax.margins(x=0.2)
         last = rows.sort_values("position").groupby("policy", sort=False).last()

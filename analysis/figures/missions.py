@@ -239,15 +239,15 @@ def plot_courses(
     else:
         values = rows[line].unique()
     if line == "policy":
-        looks = style.policy_colours(values)
+        styles = style.policy_colours(values)
     else:
-        looks = style.graded_colours(values)
+        styles = style.graded_colours(values)
     height = 1.9 * len(titles) + 1.3
     shape = {"sharex": True, "squeeze": False}
     with style.new_panels(height, len(titles), "y", 4, heading, **shape) as (figure, axes):
         for ax, (panel, title) in zip(axes.flat, titles.items(), strict=True):
             for value, course in rows[rows["panel"] == panel].groupby(line, sort=False):
-                colour = looks[value_text(value)][0]
+                colour = styles[value_text(value)][0]
                 ax.fill_between(course["slot"], course["low"], course["high"], step="post",
                                 **style.band(colour))  # fmt: skip
                 ax.plot(course["slot"], course["mean"], color=colour, label=value_text(value))

@@ -4,7 +4,7 @@ A figure is made inside ``figure_look`` and touches no state of pyplot::
 
     with style.new_panels(height=3.5, values="x") as (figure, ax):
         arms = style.error_bar_arms(row)
-        ax.errorbar(row["mean"], 0, xerr=arms, **style.dot_style(looks["greedy"]))
+        ax.errorbar(row["mean"], 0, xerr=arms, **style.dot_style(styles["greedy"]))
 
 Functions that draw rows of a tidy table on axes take estimates with ``mean``, ``low`` and
 ``high``, the ends of the interval; rows along a field also have ``position``, the place on the
@@ -34,7 +34,7 @@ from dess.analysis.names import value_text
 from dess.analysis.numbers import format_minus
 from dess.policies.shipped import WITH_LOOK
 
-Look: TypeAlias = tuple[str, str]  # a colour and a marker
+PointStyle: TypeAlias = tuple[str, str]  # a colour and a marker
 Values: TypeAlias = Literal["x", "y", "xy"]
 
 INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
@@ -195,7 +195,9 @@ def _contrast_with_white(colour: Sequence[float] | np.ndarray) -> float:
     return 1.05 / (luminance + 0.05)
 
 
-def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) -> dict[str, Look]:
+def policy_colours(
+    policies: Iterable[str], drawn: Iterable[str] | None = None
+) -> dict[str, PointStyle]:
     """Colour and marker of every policy; those of ``WITH_LOOK`` always have the same.
 
     Args:
@@ -214,7 +216,7 @@ def policy_colours(policies: Iterable[str], drawn: Iterable[str] | None = None) 
     }
 
 
-def graded_colours(values: Sequence[Any]) -> dict[str, Look]:
+def graded_colours(values: Sequence[Any]) -> dict[str, PointStyle]:
     """Colours from light to dark, and markers, for values in their order."""
     shades = [
         to_hex(_darken_until_readable(colour)) for colour in sns.color_palette("flare", len(values))
@@ -222,7 +224,7 @@ def graded_colours(values: Sequence[Any]) -> dict[str, Look]:
     return {value_text(v): (shades[k], MARKERS[k % 7]) for k, v in enumerate(values)}
 
 
-def dot_style(look: Look) -> dict:
+def dot_style(look: PointStyle) -> dict:
     """The style of means with that colour and marker, as arguments of ``Axes.errorbar``."""
     colour, marker = look
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
@@ -365,7 +367,7 @@ def place_values(rows: pd.DataFrame, field: str) -> pd.DataFrame:
 
 def plot_along(
     rows: pd.DataFrame,
-    looks: Mapping[str, Look],
+    styles: Mapping[str, PointStyle],
     unit: str,
     ax: Axes,
     line: str = "policy",
@@ -375,7 +377,7 @@ def plot_along(
 
     Args:
         rows: The rows; see ``place_values``.
-        looks: The curves to draw, by the value of the column as text.
+        styles: The curves to draw, by the value of the column as text.
         unit: The unit of the means: ``%``, ``points``, or empty for plain numbers.
         ax: The axes to draw on.
         line: The column.
@@ -389,9 +391,9 @@ def plot_along(
     else:
         half_width = 0.02
     curves = rows[line].map(value_text)
-    for name, shift in zip(looks, side_by_side_shifts(len(looks), half_width), strict=True):
+    for name, shift in zip(styles, side_by_side_shifts(len(styles), half_width), strict=True):
         means = rows[curves == name].sort_values("position")
-        look = {"label": name, "linewidth": 1, **dot_style(looks[name]), **options}
+        look = {"label": name, "linewidth": 1, **dot_style(styles[name]), **options}
         plot_with_bars(means, means["position"] + shift, ax, **look)
     name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
     set_axis_unit(ax.yaxis, unit)
@@ -405,10 +407,10 @@ def plot_in_rows(rows: pd.DataFrame, ax: Axes, *columns: str) -> None:
         ax: The axes to draw on.
         columns: The mean and the ends of its interval; by default ``mean``, ``low`` and ``high``.
     """
-    looks = policy_colours(rows["policy"])
+    styles = policy_colours(rows["policy"])
     for y, (_, row) in enumerate(rows.iterrows()):
         mean = row[columns[0] if columns else "mean"]
-        ax.errorbar(mean, y, xerr=error_bar_arms(row, *columns), **dot_style(looks[row["policy"]]))
+        ax.errorbar(mean, y, xerr=error_bar_arms(row, *columns), **dot_style(styles[row["policy"]]))
     ax.set_yticks(range(len(rows)), rows["policy"])
     ax.set_ylim(len(rows) - 0.4, -0.6)
 

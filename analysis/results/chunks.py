@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from dess import InputError
-from dess.analysis.results.manifest import ELSEWHERE, Part
+from dess.analysis.results.manifest import ELSEWHERE, CellPart
 from dess.base.files.reading import paths_in
 
 
@@ -18,7 +18,7 @@ class Chunk:
     """Missions of one team that are computed and stored together: parts of its cells."""
 
     team: int
-    parts: tuple[Part, ...]
+    parts: tuple[CellPart, ...]
 
     @property
     def missions(self) -> int:
@@ -36,15 +36,15 @@ class Chunk:
         return name_of(self.rows)
 
 
-def split_into_chunks(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
+def split_into_chunks(parts: Iterable[CellPart], size: int) -> Iterator[Chunk]:
     """Split the parts of one team, in their order, into chunks of ``size`` missions."""
-    waiting: list[Part] = []
+    waiting: list[CellPart] = []
     room = size
     for part in parts:
         rest = part.replications
         while len(rest):
             taken = rest[:room]
-            waiting.append(Part(part.cell, taken))
+            waiting.append(CellPart(part.cell, taken))
             rest = rest[len(taken) :]
             room -= len(taken)
             if not room:

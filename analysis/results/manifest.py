@@ -43,7 +43,7 @@ class Cell(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class CellPart:
     """Consecutive replications of a cell."""
 
     cell: Cell
@@ -276,11 +276,11 @@ class Manifest(provenance.Origin):
             return self._cells(NO_TEAM, run)
         return ()
 
-    def parts_of_team(self, team: int, counts: Sequence[int] | None = None) -> list[Part]:
+    def parts_of_team(self, team: int, counts: Sequence[int] | None = None) -> list[CellPart]:
         """The first missions of every cell of a team: so many, or as many as were needed."""
         return _first_parts(self.cells[team], counts or self.missions[team])
 
-    def parts_of_check(self, team: int) -> list[Part]:
+    def parts_of_check(self, team: int) -> list[CellPart]:
         """The missions that check the design points selected for a team.
 
         The selection was not based on any of these missions.
@@ -290,9 +290,9 @@ class Manifest(provenance.Origin):
             check = self.study.selection.check
         cells = self.cells[team]
         replications = range(CHECK, CHECK + check)
-        return [Part(cells[point], replications) for point in self.selected_points(team)]
+        return [CellPart(cells[point], replications) for point in self.selected_points(team)]
 
-    def parts_with_bounds(self, counts: Sequence[Sequence[int]] | None = None) -> list[Part]:
+    def parts_with_bounds(self, counts: Sequence[Sequence[int]] | None = None) -> list[CellPart]:
         """The missions that need bounds, at every design point those of any team; or none.
 
         Args:
@@ -320,8 +320,8 @@ class Manifest(provenance.Origin):
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _first_parts(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
-    return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
+def _first_parts(cells: Sequence[Cell], counts: Sequence[int]) -> list[CellPart]:
+    return [CellPart(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
 
 # Where else a run can write, in the words of a message.

@@ -35,7 +35,7 @@ from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
 @dataclass(frozen=True, eq=False)
-class Mission:
+class LoggedMission:
     """A mission with its event log, of a study or of any scenario.
 
     Attributes:
@@ -108,7 +108,7 @@ class Mission:
 
 def mission_of(
     space: ScenarioSpace, team: Sequence[Policy], seed: int = 0, replication: int = 0
-) -> Mission:
+) -> LoggedMission:
     """Simulate a mission of any scenario, with its event log.
 
     Raises:
@@ -119,10 +119,10 @@ def mission_of(
     scenario = sample_scenario(space, seed, replication)
     names = (policy.name for policy in team)
     events = pd.DataFrame(record.events.columns())
-    return Mission(",".join(names), scenario, record, _uavs_of(record), events)
+    return LoggedMission(",".join(names), scenario, record, _uavs_of(record), events)
 
 
-def resimulate(results: Results, policy: str, point: int, replication: int) -> Mission:
+def resimulate(results: Results, policy: str, point: int, replication: int) -> LoggedMission:
     """Simulate a mission of a study again, with the SimPy engine.
 
     Raises:

@@ -42,8 +42,8 @@ from dess.analysis.results.manifest import (
     ELSEWHERE,
     NO_TEAM,
     Cell,
+    CellPart,
     Manifest,
-    Part,
     Selected,
 )
 from dess.analysis.stats.intervals import worst_node
@@ -314,7 +314,7 @@ class Store:
         folders = [*paths_in(self.folder, "*/policy=*"), self.folder / chunks.BOUNDS]
         return [path for folder in folders for path in parquet.files_in(folder)]
 
-    def missing(self, kind: str, parts: Iterable[Part]) -> list[Part]:
+    def missing(self, kind: str, parts: Iterable[CellPart]) -> list[CellPart]:
         """What of some parts is missing.
 
         Args:
@@ -323,7 +323,7 @@ class Store:
         """
         return _absent_parts(parts, self._present[kind])
 
-    def begun(self, team: int) -> list[Part]:
+    def begun(self, team: int) -> list[CellPart]:
         """The missions that every cell of a team has, up to the first one that it lacks."""
         parts = []
         for cell in self.manifest.cells[team]:
@@ -331,7 +331,7 @@ class Store:
             gaps = gaps_between(whole, self._present["missions"][cell.key])
             present = range(cell.first, gaps[0].start)
             if present:
-                parts.append(Part(cell, present))
+                parts.append(CellPart(cell, present))
         return parts
 
     def work(self) -> Work:
@@ -347,7 +347,7 @@ class Store:
             bounds=self._count("bounds", manifest.parts_with_bounds()),
         )
 
-    def _count(self, kind: str, parts: Sequence[Part]) -> Count:
+    def _count(self, kind: str, parts: Sequence[CellPart]) -> Count:
         """How many missions some parts have, and how many of them are missing."""
         return Count(sum(map(len, parts)), sum(map(len, self.missing(kind, parts))))
 
@@ -365,7 +365,7 @@ class Store:
         path = parquet.write(folder, f"{cell.key}-{replication:06}", pa.table(columns))
         self._enter_log(cell.key, replication, path)
 
-    def take_over(self, other: "Store", parts: Iterable[Part]) -> None:
+    def take_over(self, other: "Store", parts: Iterable[CellPart]) -> None:
         """Copy missing missions of some parts from another folder, as far as it has them.
 
         Cells with equal keys have equal records, so this only saves time. Nothing is copied from a
@@ -416,11 +416,11 @@ class Store:
                     delete(path)
         self._scan()
 
-    def _frames(self, parts: Iterable[Part]) -> list[pd.DataFrame]:
+    def _frames(self, parts: Iterable[CellPart]) -> list[pd.DataFrame]:
         """The rows of the files with missions of some parts, and those of the files with UAVs."""
         return [*map(stack_tables, zip(*self._tables_with("missions", parts), strict=True))]
 
-    def _held(self, parts: Sequence[Part]) -> list[Part]:
+    def _held(self, parts: Sequence[CellPart]) -> list[CellPart]:
         """What of the missions of some parts is present."""
         missing: Present = defaultdict(list)
         for part in self.missing("missions", parts):
@@ -449,7 +449,7 @@ class Store:
         for path in self._failures():
             delete(path)
 
-    def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
+    def missions(self, parts: Sequence[CellPart]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
         ``most_slots`` is the longest that each may last, and ``most_waiting`` the longest that a
@@ -474,7 +474,7 @@ class Store:
             missions = missions.assign(**columns_in_units(missions, units))
         return missions
 
-    def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
+    def uavs(self, parts: Sequence[CellPart]) -> pd.DataFrame:
         """The UAVs of these missions, in the same order.
 
         Raises:
@@ -482,7 +482,7 @@ class Store:
         """
         return self._rows("missions", parts, 1)
 
-    def bounds_of(self, parts: Sequence[Part]) -> dict[Place, Bound]:
+    def bounds_of(self, parts: Sequence[CellPart]) -> dict[Place, Bound]:
         """The bounds of some parts, by design point and replication.
 
         Raises:
@@ -500,7 +500,7 @@ class Store:
             for row in self._rows("bounds", parts).to_dict("records")
         }
 
-    def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
+    def samples(self, parts: Sequence[CellPart]) -> list[dict[str, np.ndarray]]:
         """For each part, the metrics of its missions.
 
         Raises:
@@ -511,7 +511,7 @@ class Store:
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
-    def _rows(self, kind: str, parts: Sequence[Part], table: int = 0) -> pd.DataFrame:
+    def _rows(self, kind: str, parts: Sequence[CellPart], table: int = 0) -> pd.DataFrame:
         """The rows of some parts, all of which must be present, in the tables of their kind."""
         for gap in self.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
@@ -523,12 +523,12 @@ class Store:
         rows = rows_of(parts, self._stacked[key])
         return rows.drop(columns="cell")
 
-    def _tables_with(self, kind: str, parts: Iterable[Part]) -> list[Sequence[pa.Table]]:
+    def _tables_with(self, kind: str, parts: Iterable[CellPart]) -> list[Sequence[pa.Table]]:
         """The tables that contain some parts."""
         tables_of_parts = (tables for part in parts for tables in self._tables[kind, part.cell.key])
         return [*{id(tables): tables for tables in tables_of_parts}.values()]
 
-    def _incomplete(self, part: Part, gap: range) -> InputError:
+    def _incomplete(self, part: CellPart, gap: range) -> InputError:
         team = part.cell.team
         values = self.manifest.points[part.cell.point].values
         where = ""
@@ -589,21 +589,21 @@ def gaps_between(wanted: range, present: list[range]) -> list[range]:
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
 
 
-def _absent_parts(parts: Iterable[Part], present: Present) -> list[Part]:
+def _absent_parts(parts: Iterable[CellPart], present: Present) -> list[CellPart]:
     """What of some parts is not present."""
     return [
-        Part(p.cell, gap)
+        CellPart(p.cell, gap)
         for p in parts
         for gap in gaps_between(p.replications, present[p.cell.key])
     ]
 
 
-def rows_of(parts: Sequence[Part], stacked: pd.DataFrame) -> pd.DataFrame:
+def rows_of(parts: Sequence[CellPart], stacked: pd.DataFrame) -> pd.DataFrame:
     """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
 
     Args:
         parts: The parts.
-        stacked: The rows of these missions, and of others, as ``stacked`` returns them.
+        stacked: The rows of these missions, and of others, as ``stack_tables`` returns them.
     """
     lengths = [len(part.replications) for part in parts]
     keys = pd.DataFrame(

@@ -25,7 +25,7 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.stats.verdict import Verdict, judge_facts
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
-from dess.analysis.study.stopping import MOST, Line, Samples, StrictTable, of_its_kind
+from dess.analysis.study.stopping import MOST_MISSIONS, Line, Samples, StrictTable, of_its_kind
 from dess.base.errors import shown
 from dess.physics.section import Integer, Number
 from dess.scenario.fields import is_number
@@ -148,7 +148,7 @@ Excess = Callable[[np.ndarray, int], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Answer:
+class CheapestSetting:
     """The cheapest setting under one condition, or under all conditions together.
 
     Attributes:
@@ -189,13 +189,13 @@ class CheapestQuestion:
         return set(self._next.ravel().tolist())
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> CheapestSetting:
         """The answer as far as it is known."""
         left = [tuple(points) for points in self.candidates.tolist()]
         best = ()
         if self._best is not None:
             best = left[self._best]
-        return Answer(self._condition, best, tuple(left), self.settled)
+        return CheapestSetting(self._condition, best, tuple(left), self.settled)
 
     def look(self, points: "_Points", excess: Excess, indifference: float) -> None:
         """Rule out candidates that are infeasible or more expensive; check if the rest is settled.
@@ -328,7 +328,7 @@ class CheapestChoice(Chosen):
             and it is no more than ``FURTHER`` times the budget; otherwise None.
     """
 
-    answers: tuple[Answer, ...]
+    answers: tuple[CheapestSetting, ...]
     verdicts: tuple[Verdict, ...]
     enough: int | None
 
@@ -364,16 +364,19 @@ class Cheapest(StrictTable):
         ge=1e-9, le=10**15, description="the least saving that matters, in the currency"
     )
     first: Integer = Field(
-        20, ge=2, le=MOST, description="missions of every design point in round one"
+        20, ge=2, le=MOST_MISSIONS, description="missions of every design point in round one"
     )
     confidence: Number = Field(
         0.95, gt=0.5, le=0.999_999, description="probability that all statements hold"
     )
     budget: Integer = Field(
-        100_000, ge=2, le=MOST, description="missions over all design points at most"
+        100_000, ge=2, le=MOST_MISSIONS, description="missions over all design points at most"
     )
     check: Integer = Field(
-        300, ge=0, le=MOST, description="further, independent missions of every selected point"
+        300,
+        ge=0,
+        le=MOST_MISSIONS,
+        description="further, independent missions of every selected point",
     )
 
     @field_validator("requirements", mode="before")
@@ -488,7 +491,7 @@ class Cheapest(StrictTable):
         """
         if not search.done or all(question.settled for question in search.questions):
             return None
-        endless = self.model_copy(update={"budget": MOST})
+        endless = self.model_copy(update={"budget": MOST_MISSIONS})
         names = [
             "cost",
             *(_column_of(metric, search.samples[0]) for metric in self.requirements),

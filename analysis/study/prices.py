@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.study.stopping import MOST, Line, StrictTable
+from dess.analysis.study.stopping import MOST_MISSIONS, Line, StrictTable
 from dess.model.state import types_of
 from dess.physics.consumption import PERCENT
 from dess.physics.fleet import slowest, type_of
@@ -61,7 +61,9 @@ class Costs(StrictTable):
         description="price of a lost UAV: its battery is depleted, it has failed for good, or it "
         "floats out at sea at the end; what it was bought for, where missions are paid for",
     )
-    missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
+    missions: Integer = Field(
+        1, ge=1, le=MOST_MISSIONS, description="missions that the fleet is to fly"
+    )
     slot_seconds: Number | None = Field(
         None,
         ge=0.001,

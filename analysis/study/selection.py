@@ -43,7 +43,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError
 from dess.analysis.metrics import NODES_BEHIND, PRODUCT, SUCCESS, metric_of
-from dess.analysis.study.stopping import MOST, MetricName, Samples, StrictTable, values_in
+from dess.analysis.study.stopping import MOST_MISSIONS, MetricName, Samples, StrictTable, values_in
 from dess.physics.section import Integer, Number
 
 # Number of stages whose sums are computed together; it does not change any result.
@@ -139,17 +139,20 @@ class Selection(StrictTable):
         "collection_ratio_and_communication", description="the best has its best mean"
     )
     first: Integer = Field(
-        20, ge=2, le=MOST, description="missions of every design point in round one"
+        20, ge=2, le=MOST_MISSIONS, description="missions of every design point in round one"
     )
     indifference: Number = Field(
         ge=1e-9, le=10**9, description="the least lead of the best that matters"
     )
     confidence: Number = Field(0.95, gt=0.5, le=0.999_999, description="probability of finding it")
     budget: Integer = Field(
-        100_000, ge=2, le=MOST, description="missions over all design points at most"
+        100_000, ge=2, le=MOST_MISSIONS, description="missions over all design points at most"
     )
     check: Integer = Field(
-        300, ge=0, le=MOST, description="further, independent missions of the selected design point"
+        300,
+        ge=0,
+        le=MOST_MISSIONS,
+        description="further, independent missions of the selected design point",
     )
 
     @model_validator(mode="after")

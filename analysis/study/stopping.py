@@ -39,7 +39,7 @@ _METRICS = [*ALWAYS, *MEASURES]
 Samples = Sequence[Mapping[str, np.ndarray]]
 
 # The largest number of missions that a rule may ask for.
-MOST = 1_000_000_000
+MOST_MISSIONS = 1_000_000_000
 # No round multiplies the number of missions of a cell by more than this.
 _GROWTH = 2.0
 
@@ -178,12 +178,15 @@ class Precision(StrictTable):
     """
 
     first: Integer = Field(
-        30, ge=2, le=MOST, description="missions of a cell before the first check"
+        30, ge=2, le=MOST_MISSIONS, description="missions of a cell before the first check"
     )
     look_ahead: Integer = Field(
-        50, ge=0, le=MOST, description="further missions in which the targets must hold as well"
+        50,
+        ge=0,
+        le=MOST_MISSIONS,
+        description="further missions in which the targets must hold as well",
     )
-    budget: Integer = Field(5000, ge=2, le=MOST, description="missions of a cell at most")
+    budget: Integer = Field(5000, ge=2, le=MOST_MISSIONS, description="missions of a cell at most")
     targets: dict[MetricName, Target] = Field(
         min_length=1, description="metric -> { absolute = ..., relative = ... }"
     )

@@ -33,7 +33,7 @@ from dess.analysis.study.cheapest import AnySelection, Cheapest
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Selection
-from dess.analysis.study.stopping import MOST, Precision, StrictTable, Text
+from dess.analysis.study.stopping import MOST_MISSIONS, Precision, StrictTable, Text
 from dess.base.descriptions import Description
 from dess.base.errors import cut, listed, to_input_error, unknown_name
 from dess.base.files.reading import Shipped
@@ -80,7 +80,7 @@ MOST_CHARACTERS = 100
 
 # The first replication of the missions that check a selected setting. They are independent of the
 # missions on which the selection was based.
-CHECK = MOST
+CHECK = MOST_MISSIONS
 
 
 def _by_field(values: Any) -> Any:
@@ -119,7 +119,10 @@ class StudyData(StrictTable):
         min_length=1, description=Description("teams", form='"P" or "P,P,..."')
     )
     missions: Integer = Field(
-        1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"
+        1000,
+        ge=1,
+        le=MOST_MISSIONS,
+        description="per design point and policy; with a rule, not given",
     )
     precision: Precision | None = Field(
         None, description="a rule that asks for as many missions as narrow intervals take"
@@ -133,7 +136,10 @@ class StudyData(StrictTable):
         "batch", description="by default batch, or events if a design point needs it"
     )
     logged: Integer = Field(
-        0, ge=0, le=MOST, description="first replications of every cell whose event log is kept"
+        0,
+        ge=0,
+        le=MOST_MISSIONS,
+        description="first replications of every cell whose event log is kept",
     )
     bounds: bool = Field(
         False, strict=True, description="whether every mission has an upper bound, for the gap"

@@ -145,8 +145,8 @@ def unknown_name(
 ) -> InputError:
     """The error about an unknown name: it says what may be meant, and what is allowed.
 
-        >>> print(unknown_name("prices", "'uvs' is unknown", "uvs", ["uav", "pad"]))
-        prices: 'uvs' is unknown (did you mean uav?); allowed: uav, pad
+        >>> print(unknown_name("prices", "'pads' is unknown", "pads", ["uav", "pad"]))
+        prices: 'pads' is unknown (did you mean pad?); allowed: uav, pad
 
     Args:
         where: The place of the name.

@@ -6,8 +6,8 @@ comments, docstrings, layout and line numbers do not. Imports, also those inside
 from the source; no module is executed. A module that is loaded by its name (``import_module``) is
 not found this way and does not count.
 
-    >>> sorted(code_of("dess.physics.streams"))
-    ['dess.base.kernels', 'dess.base.sources', 'dess.physics.streams']
+    >>> sorted(code_of("dess.base.kernels"))
+    ['dess.base.descriptions', 'dess.base.errors', 'dess.base.kernels', 'dess.base.sources']
 """
 
 import ast

@@ -1,10 +1,10 @@
 """``parallel_env``: one mission as a PettingZoo ``ParallelEnv``.
 
-env = parallel_env(load_scenario("paper"), seed=1)
-observations, _ = env.reset()
-while env.agents:
-    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-    observations, rewards, terminated, truncated, infos = env.step(actions)
+>>> env = parallel_env(load_scenario("paper"), seed=1)
+>>> observations, _ = env.reset()
+>>> while env.agents:
+...     actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+...     observations, rewards, terminated, truncated, infos = env.step(actions)
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,8 @@
 """``single_env``: a mission of one UAV as a Gymnasium ``Env``.
 
-env = gymnasium.make("dess.envs:dess/Paper-v0")   # or single_env("paper")
-observation, info = env.reset(seed=1)
-observation, reward, terminated, truncated, info = env.step(4)
+>>> env = gymnasium.make("dess.envs:dess/Paper-v0")   # or single_env("paper")
+>>> observation, info = env.reset(seed=1)
+>>> observation, reward, terminated, truncated, info = env.step(4)
 """
 
 from typing import Any

@@ -1,8 +1,8 @@
 """Missions that advance slot by slot with actions that the caller gives; one per environment.
 
-stepper = MissionStepper(space, num_envs=4, seed=1)
-stepper.launch(stepper.indices)    # replications 0 to 3
-outcome = stepper.step(actions)    # (4, I) actions
+>>> stepper = MissionStepper(load_scenario("paper", uavs=2), num_envs=4, seed=1)
+>>> stepper.launch(stepper.indices)    # replications 0 to 3
+>>> outcome = stepper.step(np.full((4, 2), 4))    # all hover
 """
 
 from collections.abc import Sequence

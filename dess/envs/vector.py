@@ -1,8 +1,9 @@
 """``vector_env``: many missions in lockstep as a Gymnasium ``VectorEnv`` with a row per UAV.
 
-env = vector_env(load_scenario("paper"), num_envs=256, seed=1)
-observations, info = env.reset()
-observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) actions
+>>> env = vector_env(load_scenario("paper"), num_envs=64, seed=1)
+>>> observations, info = env.reset()
+>>> actions = env.action_space.sample()   # (R,)
+>>> observations, rewards, terminated, truncated, info = env.step(actions)
 """
 
 from typing import Any

@@ -1,9 +1,11 @@
 """The event log of a mission, and who writes it: a listener to the SimPy model.
 
-    log = EventLog()
-    log.add(0.0, "mission_start", 0, -1, 80)
-    log.event                # ["mission_start"]
-    log.columns()["time"]    # array([0.])
+    >>> log = EventLog()
+    >>> log.add(0.0, "mission_start", 0, -1, 80)
+    >>> log.event
+    ['mission_start']
+    >>> log.columns()["time"]
+    array([0.])
 
 The SimPy model tells a listener what happens. A ``Listener`` does nothing; a ``LogWriter`` writes
 the event log. It knows the state of the mission, and compares it with what it was before where that

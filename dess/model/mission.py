@@ -1,7 +1,8 @@
 """The SimPy model: a mission as processes that wait for each other.
 
-    record = simulate(load_scenario("paper"), dess.policies.load("greedy"), seed=1, events=True)
-    record.success, record.collection_ratio, record.events.columns()
+    >>> record = simulate(load_scenario("paper"), dess.policies.load("greedy"), seed=1, events=True)
+    >>> record.success, record.events.event[0]
+    (1, 'mission_start')
 
 The processes decide when things happen; ``rules.py`` decides what they change. Time is counted in
 mission slots. The processes of a mission are:
@@ -311,7 +312,7 @@ class Mission:
             with zone.request(priority=self.queue_key_of(uav)) as place:
                 yield place
                 self.start_charging(uav)
-                while self.is_charging(uav):  # depart charges it, settle ends the charge
+                while self.is_charging(uav):  # spend charges it, settle ends the charge
                     yield self.turns[uav].wait()
         except simpy.Interrupt as interrupt:
             if interrupt.cause == PAD_FAILED:  # at the end of a slot; the next one is to come

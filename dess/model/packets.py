@@ -1,9 +1,10 @@
 """The packets of one mission: when they arrive, and what becomes of them.
 
-    buffers = Buffers(nodes=1, limit=2)
-    buffers.store(0, 0.5, 1.0)   # a packet of one data unit at node 0, generated at 0.5
-    buffers.serve(0, 2.0, 1.0)   # at 2.0 a data unit of the node is collected
-    buffers.packets["left"]      # array([2.])
+    >>> buffers = Buffers(nodes=1, limit=2)
+    >>> _ = buffers.store(0, 0.5, 1.0)   # a packet of one data unit at node 0, generated at 0.5
+    >>> buffers.serve(0, 2.0, 1.0)   # at 2.0 a data unit of the node is collected
+    >>> buffers.packets["left"]
+    array([2.])
 
 A packet is delivered when the last part of it has been collected. Parts of packets stay in the
 buffer, also where a newer packet is served before the rest. All times are in mission slots.

@@ -1,7 +1,8 @@
 """Which nodes a lone UAV can serve, from a full battery and back within the horizon.
 
-    reach = reach_of_nodes(space)
-    space.names[reach.lost[0]]      # a node that no UAV of the fleet can serve
+    >>> reach = reach_of_nodes(load_scenario("paper"))
+    >>> reach.lost      # the nodes that no UAV of the fleet can serve
+    ()
 
 A node is in range of a cell if its mean SNR there, without shadowing, reaches the lowest rate, and
 it lies within the range of the radio. A UAV flies from some zone to a cell where the node is in

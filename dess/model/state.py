@@ -1,8 +1,8 @@
 """The state of B missions with up to I UAVs and K nodes, as arrays; a single mission has B = 1.
 
-state = state_of([space], missions=1)
-rules.launch(state, 0, starts_of([space], seed=1), 0, replication=0)
-state.uavs[0, 0]["battery"], state.residual[0]
+>>> state = state_of([load_scenario("paper", uavs=2)], missions=1)
+>>> state.uavs.shape, state.residual.shape    # (B, I) and (B, K)
+((1, 2), (1, 25))
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,8 +1,10 @@
 """The chart of a sea: its charging zones, its no-fly cells and the ways between its cells.
 
-chart = load_scenario("bay").chart
-chart.zones[y, x]                  # the zone of a cell, OPEN or NO_FLY
-distance(chart, 3, 4, 10, 12)      # cells on the shortest way
+>>> chart = load_scenario("bay").chart
+>>> int(chart.zones[12, 10]) == OPEN    # a cell has the number of its zone, OPEN or NO_FLY
+True
+>>> distance(chart, 3, 4, 10, 12)       # cells on the shortest way
+15
 """
 
 from collections.abc import Iterable

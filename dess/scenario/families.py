@@ -1,7 +1,8 @@
 """Families of generated seas: a name and a seed make a scenario, the same on every machine.
 
-space = load_scenario("archipelago:7")
-names = seas_of("test")                # 60 seas of each of SET_FAMILIES
+    >>> space = load_scenario("archipelago:7")
+    >>> len(seas_of("test")) // len(SET_FAMILIES)       # seas of each family
+    60
 
 Each sea has the ranges of the paper's Table II and its channel: a node some cells away is received
 as well as there. Sizes, numbers of nodes, charging zones, pads and UAVs differ. Seeds one after the

@@ -1,6 +1,6 @@
 """Places of users in files: rows of CSV files, and features of GeoJSON, with their projection.
 
-    read_places(Path("buoys.csv"))       # the places of a file, degrees or cells
+    read_table(Path("buoys.csv"))        # the places of a file, degrees or cells
 
 Columns of CSV files are known by their names, whatever the case (``COLUMNS``). Degrees are
 projected about the centre of the grid (equirectangular projection).
@@ -432,7 +432,7 @@ class _GeoFence(Document, extra="ignore"):
     circles: list[_PlanCircle] = []
 
 
-class _Plan(Document, extra="ignore"):
+class _PlanDocument(Document, extra="ignore"):
     """A plan of QGroundControl, of which the geofence is read."""
 
     geoFence: _GeoFence = Field(description="a geofence")  # noqa: N815
@@ -447,7 +447,7 @@ def read_plan(path: Path) -> Places:
     Raises:
         InputError: If it cannot be read, or is no plan.
     """
-    fence = _Plan.load(path, absent="a plan of QGroundControl", limit=TEXT_LIMIT).geoFence
+    fence = _PlanDocument.load(path, absent="a plan of QGroundControl", limit=TEXT_LIMIT).geoFence
     rings = []
     for number, polygon in enumerate(fence.polygons):
         where = f"geoFence.polygons.{number}"

@@ -1,6 +1,7 @@
 """Quantities as people write them: a number and a unit, such as ``35 min`` or ``3 MB/h``.
 
-    measured("12 dB at 2 km", "dB at m")    # (12.0, 2000.0)
+    >>> measured("12 dB at 2 km", "dB at m")
+    (12.0, 2000.0)
 
 ``UNITS`` lists every unit that is read, and its size. A number may have a decimal comma.
 """

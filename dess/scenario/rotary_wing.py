@@ -1,7 +1,8 @@
 """The power of a rotary wing at an airspeed, and the wind that it can fly in.
 
-    wing = RotaryWing.of(cruise=15.0)
-    wing.power(0.0) / wing.power(15.0)      # 1.216: what hovering costs, in terms of cruising
+    >>> wing = RotaryWing()
+    >>> wing.power(15.0) < wing.power(0.0) < wing.power(30.0)      # hovering, in still air
+    True
 
 The power is that of Zeng, Xu and Zhang, "Energy minimization for wireless communication with
 rotary-wing UAV", IEEE Trans. Wireless Commun. 18(4), 2019, eq. 12, as a share of the power that

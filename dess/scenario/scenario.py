@@ -1,8 +1,8 @@
 """Scenarios: all constants of the model, and the ranges from which missions draw parameters.
 
-space = load_scenario("paper", uavs=3)             # Table II, with three UAVs
-space = ScenarioSpace.of(space, quota=200)         # the same with another quota
-scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
+>>> space = load_scenario("paper", uavs=3)             # Table II, with three UAVs
+>>> space = ScenarioSpace.of(space, quota=200)         # the same with another quota
+>>> scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single one; Table III for the rest
 """
 
 from collections.abc import Iterator, Mapping

@@ -36,7 +36,7 @@ from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import to_arrays, to_tensors
 from dess.policies.learner.ppo import ProximalTraining
 from dess.policies.learner.trained import require_version
-from dess.policies.learner.training import METRICS, Training
+from dess.policies.learner.training import EVALUATED_METRICS, Training
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import ScenarioSpace
 
@@ -64,9 +64,14 @@ _OF_ROWS: dict[str, Any] = {
     **dict.fromkeys(("tick", "uav_slots", "updates"), Number),
     **dict.fromkeys(("seconds", "epsilon", "learning_rate", "moving_average"), float),
     **{"phase": Name, "is_best": bool},
-    **{f"evaluation_{name}": float for name in METRICS},
+    **{f"evaluation_{name}": float for name in EVALUATED_METRICS},
 }
-_OF_LATER_ROWS = ("loss", "value", "gradient_norm", *(f"training_{name}" for name in METRICS))
+_OF_LATER_ROWS = (
+    "loss",
+    "value",
+    "gradient_norm",
+    *(f"training_{name}" for name in EVALUATED_METRICS),
+)
 
 # A row of the curve: the metrics of an evaluation and, if there are any since the last one, of
 # updates and of missions that have ended.

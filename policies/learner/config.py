@@ -1,7 +1,9 @@
 """The settings of a training, and ``config.json``, which has them beside the weights of a policy.
 
-config = load_config("quick", seed=2)      # shipped, or the path of a TOML file
-config.num_envs, config.n_step, config.phases[0].ticks
+    >>> config = load_config("quick", seed=2)      # shipped, or the path of a TOML file
+    >>> config.seed, config.observation
+    (2, 'vector')
+
 description = read_description(Path("runs/quick"))
 description.training.seed, description.layout.nodes, description.model_sha256
 """

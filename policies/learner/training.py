@@ -27,7 +27,7 @@ from dess.policies.learner.trained import expected_weights, make_observation, ma
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 
-METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
+EVALUATED_METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
 SELECT_BY = "collection_ratio_and_communication"
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
@@ -247,10 +247,10 @@ class Training:
             "moving_average": average,
             "is_best": is_best,
         }
-        row |= {f"evaluation_{name}": float(records[name].mean()) for name in METRICS}
+        row |= {f"evaluation_{name}": float(records[name].mean()) for name in EVALUATED_METRICS}
         if self.finished:
             finished = np.concatenate(self.finished)
-            row |= {f"training_{name}": float(finished[name].mean()) for name in METRICS}
+            row |= {f"training_{name}": float(finished[name].mean()) for name in EVALUATED_METRICS}
         if self.losses:
             for name in self.losses[-1]:
                 row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())

@@ -1,7 +1,9 @@
 """The plans that a planner has during a mission, for drawings.
 
-plans = plan_of(load_scenario("paper"), seed=1, replication=0)
-plans[20][0].waypoints, plans[20][0].path     # of UAV 0, as planned in slot 20
+>>> plans = plan_of(load_scenario("paper"), seed=1, replication=0)
+>>> plans[20][0].waypoints[:2]     # of UAV 0, as planned in slot 20; ``path`` has its cells
+array([[ 3, 11],
+       [22, 16]])
 """
 
 from typing import NamedTuple

@@ -1,13 +1,13 @@
 """The plan of a team, which is a list of waypoints per UAV, and a fluid model of a mission by it.
 
 plan = empty_plan(2)
-insert(plan, 0, 0, 26, 5, CHARGE, 0)    # UAV 0 charges in cell 26, 5
+insert_waypoint(plan, 0, 0, 26, 5, CHARGE, 0)    # UAV 0 charges in cell 26, 5
 
 The fluid model: what a plan collects if every rate is its mean and data arrive evenly.
 
-    begin(mission, uavs, residual, flight)
-    value = fly(mission, rates, plan, flight, 0, flight, 500, np.inf)   # the whole plan
-    value = fly(mission, rates, other, flight, 5, ahead, 500, np.inf)   # again, from the sixth one
+    begin_flight(mission, uavs, residual, flight)
+    simulate_flight(mission, rates, plan, flight, 0, flight, 500, np.inf)   # the whole plan
+    simulate_flight(mission, rates, other, flight, 5, ahead, 500, np.inf)   # from the sixth one
 
 The model has the rules of ``dess.model.rules`` as far as they matter for a plan: a cell per move,
 batteries, the charging latch, pads and quotas. In each slot a UAV serves the node with the highest

@@ -1,6 +1,6 @@
 """The search for a plan: simulated annealing over the waypoints of the whole team.
 
-    improve(mission, uavs, residual, nodes, rates, plan, workspace, 20_000, 2.0, 20_000)
+    improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, 20_000, 2.0, 20_000)
     value = workspace.course[BEST]
 
 Each step edits the plan, flies it in the fluid model from the first slot that the edit can change,

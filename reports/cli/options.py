@@ -301,7 +301,7 @@ def _is_plain(value: Any) -> bool:
     return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
 
 
-ALLOWED = (
+RANGE_FORM = (
     "a field of the scenario and its values: 2..5, 0.01..0.05:5 (five values), or 1,2,4 in TOML "
     "syntax"
 )
@@ -353,7 +353,7 @@ def parse_values(text: str) -> tuple[str, tuple[Any, ...]]:
         for word in named:
             _check_word(field, word)
         if not equals or len(named) < len(listed):
-            raise _range_error(text, "is not KEY=VALUES", ALLOWED) from None
+            raise _range_error(text, "is not KEY=VALUES", RANGE_FORM) from None
     return field, list_values(field, listed)
 
 
@@ -405,7 +405,7 @@ def _parse_number(text: str, end: str) -> Decimal:
         number = Decimal(end.strip())
         if abs(number) <= Decimal("1e300"):
             return number
-    raise _range_error(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
+    raise _range_error(text, f"has an end {end.strip()!r} that is not a number", RANGE_FORM)
 
 
 def _range_error(text: str, problem: str, allowed: str) -> InputError:

@@ -32,7 +32,7 @@ ANIMATIONS = (".gif", ".mp4", ".html")
 MOST_DISTANCE = 100  # of UAVs of a plan from each other [m]
 PATHS = (".geojson", ".kml", ".gpx", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
-METRICS = (
+JSON_METRICS = (
     *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
     *("initial", "arrived", "collected", "residual"),
 )
@@ -151,7 +151,7 @@ def simulate(
             has_log = bool(paths) or plan is not None or not as_json
             record = simulate(asked.space, asked.team, *which, events=has_log)
         drawn = sample_scenario(asked.space, *which)
-        mission = _Mission(record, drawn, asked.title, separation, begin)
+        mission = _MissionToWrite(record, drawn, asked.title, separation, begin)
         for file, temporary in zip(paths, temporaries, strict=True):
             with writable(file):
                 writers[file](mission, temporary, file.suffix[1:].lower())
@@ -160,7 +160,7 @@ def simulate(
             flight_plan = _write_plan(mission, positions, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
-        metrics = {key: getattr(record, key) for key in METRICS}
+        metrics = {key: getattr(record, key) for key in JSON_METRICS}
         others = _metric_values(mission).items()
         in_units = _values_in_units(record.measured, mission)
         metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
@@ -257,7 +257,7 @@ def _refuse_given(context: typer.Context, names: Sequence[str], problem: str, al
 
 
 @dataclass(frozen=True)
-class _Mission:
+class _MissionToWrite:
     """A simulated mission to write into files: its record with its event log, and its names."""
 
     record: "MissionRecord"
@@ -287,7 +287,7 @@ class _Mission:
         return " ".join([outcome, *(f"{c}." for c in causes_of_failure(self.log, self.scenario))])
 
 
-def _write_log(mission: _Mission, path: Path, kind: str) -> None:
+def _write_log(mission: _MissionToWrite, path: Path, kind: str) -> None:
     import numpy as np
     import pandas as pd
     import pyarrow as pa
@@ -305,7 +305,7 @@ def _write_log(mission: _Mission, path: Path, kind: str) -> None:
         fill(path, parquet_of(pa.table(columns)))
 
 
-def _write_map(mission: _Mission, path: Path, kind: str) -> None:
+def _write_map(mission: _MissionToWrite, path: Path, kind: str) -> None:
     from dess.analysis.figures.missions import mission_figure
 
     save_figure(mission_figure(mission.log, mission.scenario), path, kind)
@@ -316,7 +316,7 @@ def save_figure(figure: "Figure", path: Path, kind: str) -> None:
     figure.savefig(path, format=kind)
 
 
-def _write_animation(mission: _Mission, path: Path, kind: str) -> None:
+def _write_animation(mission: _MissionToWrite, path: Path, kind: str) -> None:
     from dess.reports.player import write_animation
 
     if kind == "html":
@@ -325,7 +325,7 @@ def _write_animation(mission: _Mission, path: Path, kind: str) -> None:
         write_animation(mission.log, mission.scenario, path, kind, mission.title)
 
 
-def _write_path(mission: _Mission, path: Path, kind: str) -> None:
+def _write_path(mission: _MissionToWrite, path: Path, kind: str) -> None:
     from dess.analysis.results.event_log import path_text
     from dess.base.files.writing import fill
 
@@ -402,7 +402,7 @@ def _parse_separation(air: str, ground: str) -> "Separation":
     return Separation(*metres)
 
 
-def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "FlightPlan":
+def _write_plan(mission: _MissionToWrite, positions: "Positions", folder: Path) -> "FlightPlan":
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.base.files.writing import fill
 
@@ -414,7 +414,7 @@ def _write_plan(mission: _Mission, positions: "Positions", folder: Path) -> "Fli
     return flight_plan
 
 
-def _write_page(mission: _Mission, path: Path) -> None:
+def _write_page(mission: _MissionToWrite, path: Path) -> None:
     """Write a page with the player of the mission; the same mission gives the same bytes."""
     from dess.base.files import writing
     from dess.reports import player
@@ -429,7 +429,7 @@ def _write_page(mission: _Mission, path: Path) -> None:
     writing.fill(path, page)
 
 
-def _metric_values(mission: _Mission) -> dict[str, float]:
+def _metric_values(mission: _MissionToWrite) -> dict[str, float]:
     """The metrics of every mission."""
     metrics = mission.record.metrics
     return _values_in_units(
@@ -437,7 +437,7 @@ def _metric_values(mission: _Mission) -> dict[str, float]:
     )
 
 
-def _values_in_units(values: dict[str, Any], mission: _Mission) -> dict[str, Any]:
+def _values_in_units(values: dict[str, Any], mission: _MissionToWrite) -> dict[str, Any]:
     """Values of the mission; with a data sheet, in units as well."""
     from dess.analysis.metrics import columns_in_units
 
@@ -445,7 +445,7 @@ def _values_in_units(values: dict[str, Any], mission: _Mission) -> dict[str, Any
     return values | columns_in_units(values, units) if units else values
 
 
-def _print_mission(mission: _Mission) -> None:
+def _print_mission(mission: _MissionToWrite) -> None:
     from dess.analysis.metrics import column_in_sheet_unit, measured_in, metric_of
     from dess.analysis.results.event_log import causes_of_failure, residual_data
 

@@ -27,7 +27,7 @@ from dess.analysis import load_results, numbers
 from dess.analysis.answers import missions, summary
 from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
-from dess.analysis.results.resimulate import Mission
+from dess.analysis.results.resimulate import LoggedMission
 from dess.reports.pages.markdown import command_block, write_markdown
 from dess.reports.pages.panel import make_another
 from dess.reports.pages.parts import Part, make_answer, make_gallery
@@ -44,8 +44,8 @@ best = summary.best_policy(fig1.missions)
 shown_policy = policy or ranked[0]
 seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
-shown = [Mission.of(fig4, shown_policy, point, replication) for point in points]
-example = Mission.of(fig1, best, 0, replication)
+shown = [LoggedMission.of(fig4, shown_policy, point, replication) for point in points]
+example = LoggedMission.of(fig1, best, 0, replication)
 
 # %%
 make_answer(missions.shared_collection_sentence(shown))
@@ -55,14 +55,14 @@ player_script()
 
 
 # %%
-def told(mission: Mission) -> Shown:
+def told(mission: LoggedMission) -> Shown:
     collected = numbers.format_percent(mission.record[RATIO])
     title = f"{mission.fleet}, {mission.policy}: {collected} collected"
     choice = f"replication {mission.replication}"
     return Shown(mission.events, mission.scenario, title, choice)
 
 
-def played(mission: Mission, name: str) -> Part:
+def played(mission: LoggedMission, name: str) -> Part:
     caption = (
         f"n = 1 mission of {mission.policy}, replication {replication} of seed {seed}, "
         f"{mission.record.slots} mission slots. {mission.causes}"
@@ -73,7 +73,7 @@ def played(mission: Mission, name: str) -> Part:
 # %%
 stored = range(min(fig4.study.logged, CHOICES))
 others = [number for number in stored if number != replication]
-choices = [Mission.of(fig4, shown_policy, points[-1], number) for number in others]
+choices = [LoggedMission.of(fig4, shown_policy, points[-1], number) for number in others]
 caption = (
     f"n = 1 mission of {shown_policy}: replication {replication} of seed {seed} or, by choice, "
     f"another of {len(choices) + 1}. {shown[-1].causes}"
@@ -106,7 +106,7 @@ make_another(space, fig4.study.scenario, [shown_policy], seed, given)
 
 # %%
 second = next((other for other in ranked if other != shown_policy), shown_policy)
-other = Mission.of(fig4, second, points[-1], replication)
+other = LoggedMission.of(fig4, second, points[-1], replication)
 join_players([played(shown[-1], "player-first"), played(other, "player-second")])
 
 # %% [markdown]

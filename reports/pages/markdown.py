@@ -1,6 +1,7 @@
 """Sentences, names and blocks of code in Markdown, in which every value is escaped.
 
-write_markdown("{n:,} missions of {policy}.", n=300, policy="greedy")
+>>> fill_markdown("{n:,} missions of {policy}.", n=3000, policy="*mine*")
+'3,000 missions of &#42;mine&#42;.'
 """
 
 import re

@@ -4,8 +4,8 @@ A notebook is a Python file in jupytext's percent format. Its heading and first 
 title and the description of the page. Its metadata name the studies that it reads, and tell whether
 its page has scripts. One of its cells is tagged ``parameters``:
 
-    report = read("what-if")
-    report.set({"missions": 500})
+    >>> report = read_report("what-if")
+    >>> report.set_parameters({"missions": 500})
 """
 
 import ast

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 STUDY, FILES, CARD, PANEL = "dess-study", "dess-files", "dess-card", "dess-panel"
 LARGEST = 512 * 2**20  # bytes of a page that is shown in an index
 LIMIT = 64 * 2**20  # bytes of a page that is verified
-ALLOWED = "a page of dess report"
+PAGE_FORM = "a page of dess report"
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
 _BAR, _END = "<!--bar-->", "<!--/bar-->"  # stand around the links to the other pages
@@ -86,10 +86,10 @@ class Page:
 
     text: str
     where: str = "page"
-    allowed: str = ALLOWED
+    allowed: str = PAGE_FORM
 
     @classmethod
-    def read(cls, path: Path, limit: int = LARGEST, allowed: str = ALLOWED) -> "Page":
+    def read(cls, path: Path, limit: int = LARGEST, allowed: str = PAGE_FORM) -> "Page":
         """Read a page of at most so many bytes from a file."""
         return cls(read_text(path, limit, allowed=allowed), str(path), allowed)
 

@@ -1,6 +1,7 @@
 """Parts of a page as data: its answer, its figures with captions, and what is shown below them.
 
-make_gallery([(drawing, "Success of every policy", "n = 300 missions")])
+>>> make_answer("Two *UAVs* are enough.").values
+{'sentence': 'Two UAVs are enough.', 'number': ''}
 """
 
 import os

@@ -1,6 +1,8 @@
 """Tables in HTML: numbers are aligned, and an interval is not broken.
 
-make_table(frame, "Means with 95 % intervals")
+>>> table = make_table(pd.DataFrame({"Policy": ["greedy"]}), "Means with 95 % intervals")
+>>> table.data.partition("</p>")[0]
+'<p class="caption">Means with 95 % intervals'
 """
 
 import re

@@ -34,12 +34,12 @@ from dess.base.files.reading import paths_in
 from dess.base.libraries import missing
 from dess.model.events import PARAMETER_EVENTS
 from dess.policies.registry import Policy, is_confirmed, load_team
-from dess.reports.pages.page import ALLOWED, LIMIT, PANEL, Page
+from dess.reports.pages.page import LIMIT, PAGE_FORM, PANEL, Page
 from dess.scenario.scenario import ScenarioSpace
 
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 
-_ALLOWED = f"{ALLOWED}, or a results folder"
+_PAGE_OR_FOLDER = f"{PAGE_FORM}, or a results folder"
 
 _Item = TypeVar("_Item")
 _Drawn = Sequence[tuple[SampleMission, ScenarioSpace, list[Policy]]]
@@ -112,9 +112,9 @@ def verify_page(
         InputError: If the file is not a page of dess, a policy cannot be loaded, or the missions
             may take more than an hour.
     """
-    page = Page.read(path, LIMIT, _ALLOWED)
+    page = Page.read(path, LIMIT, _PAGE_OR_FOLDER)
     if not page.has_seal:
-        raise InputError(path, "is not a page of dess", _ALLOWED)
+        raise InputError(path, "is not a page of dess", _PAGE_OR_FOLDER)
     altered = []
     if not page.is_sealed:
         altered = ["the page has been altered"]
@@ -152,7 +152,7 @@ def verify_results(
     """
     folders = [path.parent for path in paths_in(folder, f"**/{MANIFEST}")]
     if not folders:
-        raise InputError(folder, "contains no results and is not a page", _ALLOWED)
+        raise InputError(folder, "contains no results and is not a page", _PAGE_OR_FOLDER)
     sampling = _Sampling(missions, seed, named, yes)
     if folders == [folder]:
         return _check_study(Store.read(folder), sampling)

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import FOLDERS, Chunk
-from dess.analysis.results.manifest import Manifest, Part
+from dess.analysis.results.manifest import CellPart, Manifest
 from dess.analysis.results.store import Store, rows_of, stack_tables
 
 LONGEST = 120  # bytes of a file's name that are made of the text
@@ -85,11 +85,11 @@ def _changed(manifest: Manifest, text: str) -> dict[str, Any]:
     return {"policies": teams, "study": manifest.study.model_copy(update=study)}
 
 
-def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
+def _copy(source: Store, store: Store, parts: list[CellPart], cells: Any) -> None:
     """Copy missions as one file under the keys of other cells."""
     chunk = Chunk(
         parts[0].cell.team,
-        tuple(Part(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
+        tuple(CellPart(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
     )
     tables = zip(*source._tables_with("missions", parts), strict=True)
     rows = [rows_of(parts, stack_tables(of_kind)) for of_kind in tables]

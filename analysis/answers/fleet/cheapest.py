@@ -57,7 +57,7 @@ from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.stats.verdict import Verdict
-from dess.analysis.study.cheapest import Answer, Cheapest, CheapestChoice
+from dess.analysis.study.cheapest import Cheapest, CheapestChoice, CheapestSetting
 from dess.analysis.study.prices import has_priced_types
 from dess.scenario.fields import ZONE_PADS
 
@@ -89,7 +89,7 @@ class FleetAnswer:
         return cheapest_choice(self.results, self.policy)
 
     @property
-    def _answer(self) -> Answer:
+    def _answer(self) -> CheapestSetting:
         return self._choice.answers[self.number]
 
     @property

@@ -54,7 +54,7 @@ def plot_costs(
         currency: The currency of the costs.
         required: The required mean of the metric, drawn as a line.
     """
-    looks = style.policy_colours(table["policy"])
+    styles = style.policy_colours(table["policy"])
     metric = measure.column
     ends = interval_columns(metric)
     table = table.assign(**(table[ends] * measure.scale))
@@ -63,14 +63,14 @@ def plot_costs(
         if len(best) > 1:
             plot_front(best[COST], best[metric], "front of the estimates", ax)
         for _, row in table.iterrows():
-            colour, marker = looks[row["policy"]]
+            colour, marker = styles[row["policy"]]
             x_arm, y_arm = (
                 style.error_bar_arms(row, m, f"{m}_low", f"{m}_high") for m in (COST, metric)
             )
             ax.errorbar(row[COST], row[metric], xerr=x_arm, yerr=y_arm, color=colour, elinewidth=1,
                         marker=marker, markersize=4 + 5 * row["probability"],
                         alpha=FAINT + (1 - FAINT) * row["probability"])  # fmt: skip
-        for policy, (colour, marker) in looks.items():
+        for policy, (colour, marker) in styles.items():
             ax.plot([], [], color=colour, marker=marker, linestyle="", label=policy)
         if len(table) <= MOST_NAMES:
             named = table.sort_values(COST)

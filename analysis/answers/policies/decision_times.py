@@ -238,14 +238,14 @@ def plot_decision_times(table: pd.DataFrame) -> Figure:
     Args:
         table: Rows of ``decision_time_front``.
     """
-    looks = style.policy_colours(table["policy"])
+    styles = style.policy_colours(table["policy"])
     best = table[table["on_front"]].sort_values("seconds")
     with style.new_panels(4.2) as (figure, ax):
         plot_front(best["seconds"], best["mean"], "Pareto front", ax)
         for _, row in table.iterrows():
             arms = style.error_bar_arms(row)
             ax.errorbar(row["seconds"], row["mean"], yerr=arms, label=row["policy"],
-                        linestyle="", **style.dot_style(looks[row["policy"]]))  # fmt: skip
+                        linestyle="", **style.dot_style(styles[row["policy"]]))  # fmt: skip
         ax.set(xscale="log", title="Decision time against quality", ylabel=METRICS[PRODUCT])
         ax.set_xlabel("time of a decision for one mission, median")
         ax.set_xlim(table["seconds"].min() / 2, table["seconds"].max() * 2)

@@ -99,16 +99,16 @@ def plot_curves(
     shared = {"sharex": True, "sharey": True, "squeeze": False}
     values = style.ordered_values(rows[line])
     if of_policies:
-        looks = style.policy_colours(values)
+        styles = style.policy_colours(values)
     else:
-        looks = style.graded_colours(values)
+        styles = style.graded_colours(values)
     heading = None
     if not of_policies:
         heading = field_named(line).label
     height = 2.9 * len(parts) + 0.9
     with style.new_panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
-            style.plot_along(part, looks, metric_of(metric).axis, ax, line)
+            style.plot_along(part, styles, metric_of(metric).axis, ax, line)
             title = ""
             if panel:
                 title = field_named(panel).words(value)
@@ -258,10 +258,10 @@ def draw_main_effects(
     """
     effects = main_effects(results, metric, policy)
     measure = metric_of(metric)
-    looks = style.policy_colours(results.policies, effects["policy"])
+    styles = style.policy_colours(results.policies, effects["policy"])
 
     def draw(field: str, ax: Axes) -> None:
-        style.plot_along(effects[effects["field"] == field], looks, measure.axis, ax)
+        style.plot_along(effects[effects["field"] == field], styles, measure.axis, ax)
 
     drawing = _panel_per_field(fields_by_influence(effects), measure, draw)
     caption = (
@@ -283,12 +283,12 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
     """
     table = rank_settings(results, metric, policy)
     measure = metric_of(metric)
-    looks = style.policy_colours(results.policies, table["policy"])
+    styles = style.policy_colours(results.policies, table["policy"])
 
     def draw(field: str, ax: Axes) -> None:
         rows = style.place_values(table, field)
         for name, part in rows.groupby("policy", sort=False):
-            colour, marker = looks[str(name)]
+            colour, marker = styles[str(name)]
             ax.scatter(part["position"], part[metric], s=18, alpha=0.7, color=colour, label=name,
                        marker=marker, linewidths=0, rasterized=len(table) > 2000)  # fmt: skip
         ticks = rows.drop_duplicates("position").sort_values("position")

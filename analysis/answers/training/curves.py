@@ -84,9 +84,9 @@ def plot_trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str])
 
     drawn = curves[curves["variant"].isin(labels)]
     averages = smooth_curves(drawn, metric)
-    looks = zip(labels.items(), style.readable_palette(), style.LINES, strict=False)
+    styles = zip(labels.items(), style.readable_palette(), style.LINES, strict=False)
     with style.new_panels(3.9, values="y", legend=2) as (figure, ax):
-        for (variant, label), colour, line in looks:
+        for (variant, label), colour, line in styles:
             of_variant = averages[averages["variant"] == variant]
             last = of_variant["phase"].iloc[-1]
             n = of_variant["seed"].nunique()

@@ -127,7 +127,7 @@ def transfer_table(
     """Trainings with transfer learning compared with those without, as a table of text.
 
     Args:
-        transfers: The result of ``transfers``, by the name of the pair and the metric.
+        transfers: The result of ``compare_all_transfers``, by the name of the pair and the metric.
         verdicts: The verdict on each.
     """
     rows = []

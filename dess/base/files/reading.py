@@ -1,6 +1,8 @@
 """Reading and listing files that may come from anybody: bytes, text, TOML and JSON as plain data.
 
-where, values = Shipped("scenario", "dess", "scenarios").load("paper")
+>>> where, values = Shipped("scenario", "dess", "scenarios").load("paper")
+>>> values["uavs"]
+[1, 3]
 """
 
 import json

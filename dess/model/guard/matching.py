@@ -1,4 +1,4 @@
-"""Which zone each UAV counts on where some zone has fewer cells than there are UAVs.
+"""Which zone each UAV counts on where the UAVs together would fill some zone.
 
 If each chose the best zone for itself, two UAVs could count on the last cell of a small zone, and
 the one that comes second may be too far from any other. So all UAVs are matched to the cells of
@@ -6,6 +6,9 @@ zones together: no zone gets more UAVs than it has cells, and the battery and th
 lack for their ways home are the least possible. A safe move keeps the zone in reach to which the
 state before it matches the UAV. So if no UAV lacks anything in one slot, there is such a matching
 in the next one as well. The start zone has a cell for each UAV, so there always is a matching.
+
+In a full zone, UAVs are matched to its cells in the same way, by the squares of their ways. Cells
+that UAVs close off by those that they keep do not count.
 
 Where UAVs take turns at pads, the plan of pads (``dess.model.guard.queues``) tells the zones.
 """
@@ -15,22 +18,15 @@ import numpy as np
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import dearest_slot, late_slots, margin, margin_slots, usable_battery
 from dess.model.guard.queues import find_ways, is_given_up, needs_pad
-from dess.model.guard.ways import is_parked
+from dess.model.guard.ways import battery_of_way, is_parked
+from dess.model.state import STEP_X, STEP_Y
+from dess.physics.chart import distance, is_open, length_around
 from dess.physics.landing import lands
 
 # The price of a way home is the battery that it takes, and more for each unit that lacks for it and
 # the margin, and if it is not possible at all. No sum of lesser prices comes near a larger one.
 _LACKING, _UNREACHABLE = 2**24, 2**52
 _NO_WAY = 2**60
-
-
-@inlined
-def is_tight(mission, chart):
-    """Whether some zone has fewer cells than the mission has UAVs."""
-    fewest = mission.uavs
-    for zone in range(mission.zones):
-        fewest = min(fewest, chart.sizes[zone])
-    return fewest < mission.uavs
 
 
 @inlined
@@ -58,14 +54,15 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         reach: The table of ``reach_of``.
     """
     prices = np.full((mission.uavs, mission.zones), _NO_WAY, np.int64)
-    left = chart.sizes.copy()
+    zones = np.full(mission.uavs, -1, np.int64)
+    closed = _kept_cells(mission, uavs, chart)
+    left = chart.sizes - _shut_cells(mission, uavs, chart, closed)
     for j in range(mission.uavs):
         u, turn = uavs[j], plan.turns[j]
-        turn.zone = -1
         if not needs_pad(mission, u, data):
             continue
         if keeps_cell(mission, u):
-            turn.zone = u.zone
+            zones[j] = u.zone
             turn.way[u.zone] = 0
         else:
             find_ways(mission, u, turn, chart, reach)
@@ -73,16 +70,19 @@ def match_zones(mission, uavs, data, chart, plan, reach):
                 prices[j, zone] = _price(mission, u, turn.spent[zone], turn.way[zone])
                 if is_given_up(mission, zone):
                     prices[j, zone] += _UNREACHABLE
-            turn.zone = np.argmin(prices[j])
-        left[turn.zone] -= 1
-    spread_out(prices, plan.turns, left)
+            zones[j] = np.argmin(prices[j])
+        left[zones[j]] -= 1
+    spread_out(prices, zones, left)
     for j in range(mission.uavs):
         turn = plan.turns[j]
+        turn.zone, turn.cell = zones[j], -1
         if turn.zone >= 0:
             turn.asks = turn.way[turn.zone]
     for zone in range(mission.zones):
         plan.queues[zone].is_full = left[zone] <= 0
         plan.queues[zone].change = 0
+        if left[zone] <= 0:
+            _match_cells(mission, uavs, zone, chart, plan.turns, closed, reach)
 
 
 @inlined
@@ -99,53 +99,146 @@ def _price(mission, u, spent, slots):
 
 
 @shared_kernel
-def spread_out(prices, turns, left):
-    """Spread UAVs that are in the best zone for each over the zones with the least sum of prices.
+def _match_cells(mission, uavs, zone, chart, turns, closed, reach):
+    """Match the UAVs that come to a small zone to its cells.
 
-    While a zone has more UAVs than cells, one of them goes to another zone, and if this is full,
-    one of that zone goes on from there, and so on: by the cheapest of such chains (successive
-    shortest paths).
-
-    Args:
-        prices: (I, Z) the price of each zone for each UAV; that of a UAV that stays is ``_NO_WAY``.
-        turns: (I,) ``TURN`` records with the zones, -1 for UAVs without one.
-        left: (Z,) the cells that are left in each zone, negative where there are too many UAVs.
+    The sum of the squares of their ways is the least possible, so that of two UAVs on one line the
+    first flies on to the deeper cell. It falls with each cell that UAVs fly on their ways, so that
+    no UAVs change places with each other again and again.
     """
-    for zone in range(len(left)):
-        while left[zone] < 0:
-            end = _move_on(prices, turns, left, zone)
-            if end < 0:
-                break
-            left[end] -= 1
-            left[zone] += 1
+    cells, count = np.empty(chart.sizes[zone], np.int64), 0
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        is_kept = (closed == y * chart.zones.shape[1] + x).any()
+        if chart.zones[y, x] == zone and not is_kept:
+            cells[count] = cell
+            count += 1
+    prices = np.full((mission.uavs, count), _NO_WAY, np.int64)
+    places = np.full(mission.uavs, -1, np.int64)
+    left = np.ones(count, np.int64)
+    for j in range(mission.uavs):
+        u = uavs[j]
+        if count == 0 or turns[j].zone != zone or keeps_cell(mission, u):
+            continue
+        for place in range(count):
+            x, y = chart.parking[cells[place], 0], chart.parking[cells[place], 1]
+            way = distance(chart, u.x, u.y, x, y)
+            if len(closed) > 0:
+                way = length_around(chart.zones, chart.ways, chart.rows, closed, u.x, u.y, x, y)
+            spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, way, reach)
+            prices[j, place] = min(spent, _LACKING) ** 2
+            if spent + dearest_slot(mission) > usable_battery(mission, u):
+                prices[j, place] += _UNREACHABLE
+        places[j] = np.argmin(prices[j])
+        left[places[j]] -= 1
+    spread_out(prices, places, left)
+    for j in range(mission.uavs):
+        if places[j] >= 0:
+            turns[j].cell = cells[places[j]]
 
 
 @shared_kernel
-def _move_on(prices, turns, left, start):
-    """Let a UAV leave a zone by the cheapest chain; the zone where this ends, or -1.
+def _kept_cells(mission, uavs, chart):
+    """The numbers of the cells, counted row by row, that UAVs keep."""
+    cells, count = np.empty(mission.uavs, np.int64), 0
+    for j in range(mission.uavs):
+        if keeps_cell(mission, uavs[j]):
+            cells[count] = uavs[j].y * chart.zones.shape[1] + uavs[j].x
+            count += 1
+    return cells[:count]
 
-    This is Bellman and Ford's algorithm, on zones.
+
+@shared_kernel
+def _shut_cells(mission, uavs, chart, closed):
+    """How many cells of each zone are shut: no UAV is there, and UAVs keep all cells beside it.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        chart: ``Chart``.
+        closed: The numbers of the cells that UAVs keep.
+
+    Returns:
+        (Z,) the cells.
     """
-    least = np.full(len(left), _NO_WAY, np.int64)  # the price of a chain to each zone
+    shut = np.zeros_like(chart.sizes)
+    if len(closed) == 0:
+        return shut
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        if not _has_uav(mission, uavs, x, y) and not _can_be_entered(chart, closed, x, y):
+            shut[chart.zones[y, x]] += 1
+    return shut
+
+
+@inlined
+def _has_uav(mission, uavs, x, y):
+    """Whether an active UAV is in a cell."""
+    count = 0
+    for j in range(mission.uavs):
+        count += uavs[j].active and uavs[j].x == x and uavs[j].y == y
+    return count > 0
+
+
+@shared_kernel
+def _can_be_entered(chart, closed, x, y):
+    """Whether one of the cells beside a cell is open, and no UAV keeps it."""
+    for action in range(4):
+        from_x, from_y = x + STEP_X[action], y + STEP_Y[action]
+        number = from_y * chart.zones.shape[1] + from_x
+        if is_open(chart, from_x, from_y) and not (closed == number).any():
+            return True
+    return False
+
+
+@shared_kernel
+def spread_out(prices, places, left):
+    """Spread UAVs that are in the best place for each over the places with the least sum of prices.
+
+    A place is a zone, or a cell. While one has more UAVs than it has room for, one of them goes to
+    another, and if this is full, one goes on from there, and so on: by the cheapest of such chains
+    (successive shortest paths).
+
+    Args:
+        prices: (I, P) the price of each place for each UAV, ``_NO_WAY`` for one that stays.
+        places: (I,) the place of each UAV, or -1; the result is written into it.
+        left: (P,) the room that is left in each place, negative where there are too many UAVs.
+    """
+    for place in range(len(left)):
+        while left[place] < 0:
+            end = _move_on(prices, places, left, place)
+            if end < 0:
+                break
+            left[end] -= 1
+            left[place] += 1
+
+
+@shared_kernel
+def _move_on(prices, places, left, start):
+    """Let a UAV leave a place by the cheapest chain; the place where this ends, or -1.
+
+    This is Bellman and Ford's algorithm, on places.
+    """
+    least = np.full(len(left), _NO_WAY, np.int64)  # the price of a chain to each place
     least[start] = 0
     who = np.full(len(left), -1, np.int64)  # the UAV that goes there in it
     for _ in range(len(left)):
         for j in range(len(prices)):
-            now = turns[j].zone
+            now = places[j]
             if now < 0 or prices[j, now] == _NO_WAY or least[now] == _NO_WAY:
                 continue
-            for zone in range(len(left)):
-                price = least[now] + prices[j, zone] - prices[j, now]
-                if zone != now and zone != start and price < least[zone]:
-                    least[zone], who[zone] = price, j
+            for place in range(len(left)):
+                price = least[now] + prices[j, place] - prices[j, now]
+                if place != now and place != start and price < least[place]:
+                    least[place], who[place] = price, j
     end = -1
-    for zone in range(len(left)):
-        if left[zone] > 0 and who[zone] >= 0 and (end < 0 or least[zone] < least[end]):
-            end = zone
-    zone = end
-    while zone >= 0 and zone != start:
-        j = who[zone]
-        before = turns[j].zone
-        turns[j].zone = zone
-        zone = before
+    for place in range(len(left)):
+        if left[place] > 0 and who[place] >= 0 and (end < 0 or least[place] < least[end]):
+            end = place
+    place = end
+    while place >= 0 and place != start:
+        j = who[place]
+        before = places[j]
+        places[j] = place
+        place = before
     return end

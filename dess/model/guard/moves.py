@@ -15,7 +15,6 @@ from dess.model.guard.battery import (
     usable_battery,
     will_charge,
 )
-from dess.model.guard.matching import is_tight
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
 from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import (
@@ -25,6 +24,7 @@ from dess.model.guard.ways import (
     cells_home,
     is_late,
     is_parked,
+    is_tight,
 )
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
@@ -98,20 +98,23 @@ def _ceded(mission, uavs, i):
 
 
 @inlined
-def _into_cells_of_others(mission, u, chart, planned):
-    """The moves of UAV ``u`` into the zone cells that teammates chose before it.
+def _into_cells_of_others(mission, uavs, i, chart, memory):
+    """The moves of UAV ``i`` into zone cells that teammates count on.
 
-    Such a teammate has less battery. If its cell was taken shortly before it comes, it would have
-    to fly on to another.
+    Those are teammates that choose before it or have less battery. If such a cell was taken shortly
+    before the teammate comes, it would have to fly on to another.
 
     Returns:
         A bit for each action.
     """
-    moves = 0
+    u, moves = uavs[i], 0
     for j in range(mission.uavs):
-        if planned[j] < 0:
+        cell = memory.planned[j]
+        if cell < 0 and uavs[j].battery < u.battery:
+            cell = memory.plan.turns[j].cell
+        if j == i or cell < 0:
             continue
-        x, y = chart.parking[planned[j], 0], chart.parking[planned[j], 1]
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         for action in range(4):
             if u.x + STEP_X[action] == x and u.y + STEP_Y[action] == y:
                 moves |= 1 << action
@@ -140,7 +143,7 @@ def _is_in_the_way(mission, uavs, i):
 
 
 @inlined
-def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
+def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -157,15 +160,15 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home: The result of ``parking_cell``.
-        planned: As in ``Parking``, as ``parking_cell`` leaves it.
+        memory: ``parking_memory``, as ``parking_cell`` leaves it.
         reach: The table of ``reach_of``.
 
     Returns:
         The safe actions, a bit for each.
     """
-    u = uavs[i]
-    stands = lands(mission) and is_parked(mission, u) and home.gives_way == 0
-    if charge and (u.pad_request >= 0 or stands):
+    u, planned = uavs[i], memory.planned
+    parked = is_parked(mission, u) and not (lands(mission) and home.gives_way == 1)
+    if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + dearest_slot(mission) * home.wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
@@ -181,7 +184,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         # Teammates fly around a parked UAV, so it need not leave its cell for any.
-        remains = action == HOVER and is_parked(mission, u)
+        remains = action == HOVER and parked
         contested = 0 if remains else contest(levels, action)
         gives_way = charge and home.gives_way == 1 and action == HOVER
         if not is_open(chart, x, y) or contested == 3 or gives_way:
@@ -215,19 +218,20 @@ def safe_moves(mission, uavs, i, chart, charge, home, planned, reach):
         if late == least:
             nearest |= bit
     elsewhere = nearest & ~(1 << HOVER)
-    if elsewhere and not is_parked(mission, u) and _is_in_the_way(mission, uavs, i):
+    if elsewhere and not parked and _is_in_the_way(mission, uavs, i):
         # a teammate may stay where it is, unless it is told to leave its cell, too
         leaves = elsewhere & empty or elsewhere & clear
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
             leaves = elsewhere & ~_ceded(mission, uavs, i)
         if u.overruled and u.zone >= 0 and is_tight(mission, chart):
-            # A teammate may want the same cell again and again, so it tries one after another.
-            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere
+            # A teammate may want the same cell again and again, so it tries one after another, and
+            # lets the teammate go first in some slots.
+            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere | 1 << HOVER
             leaves = _one_of(leaves, mission.slot)
         if leaves:
             return leaves
     if charge and least == 0 and lands(mission):
-        nearest = nearest & ~_into_cells_of_others(mission, u, chart, planned) or nearest
+        nearest = nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory) or nearest
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
@@ -400,7 +404,7 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
     home = stays(uavs[i])
     if charge or find_home:
         home = parking_cell(mission, uavs, i, data, chart, memory, reach)
-    return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory.planned, reach)
+    return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory, reach)
 
 
 def guard(view: View) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import dearest_slot, late_slots, usable_battery
-from dess.model.guard.matching import is_tight, keeps_cell, match_zones
+from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     KEPT,
     QUEUE,
@@ -17,7 +17,13 @@ from dess.model.guard.queues import (
     plan_pads,
     waits_in_zone,
 )
-from dess.model.guard.ways import battery_of_way, is_crowded, is_parked, path_length
+from dess.model.guard.ways import (
+    battery_of_way,
+    is_crowded,
+    is_parked,
+    is_tight,
+    path_length,
+)
 from dess.model.ways_home import is_calm
 from dess.physics.chart import distance
 from dess.physics.landing import lands
@@ -115,11 +121,11 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         memory: ``parking_memory``.
         reach: The table of ``reach_of``.
     """
+    for j in range(mission.uavs):
+        memory.plan.turns[j].zone = memory.plan.turns[j].cell = -1
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
-    for j in range(mission.uavs):
-        memory.plan.turns[j].zone = -1
     if not may_wait(mission, uavs, data):
         if not is_tight(mission, chart):
             return _choose(mission, uavs, i, chart, memory, reach)
@@ -248,9 +254,10 @@ def _choose(mission, uavs, i, chart, memory, reach):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
-        if turns[j].zone >= 0 and memory.plan.queues[turns[j].zone].is_full:
-            later = memory.order[place + 1 : count]
-            cell, cells = _deepest_free(mission, uavs, j, later, chart, memory, reach)
+        cell, cells = turns[j].cell, np.int64(0)
+        if cell >= 0:
+            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+            cells = path_length(mission, uavs, j, chart, None, o.x, o.y, x, y)
         else:
             cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
         if j == i:
@@ -269,51 +276,6 @@ def _has_cell(mission, u, are_matched):
     if are_matched:
         return keeps_cell(mission, u)
     return is_parked(mission, u)
-
-
-@shared_kernel
-def _deepest_free(mission, uavs, j, later, chart, memory, reach):
-    """The number of the cell that UAV ``j`` takes in a full zone, and the way to it.
-
-    It is the one that is farthest from those that come later, so that it closes none of their ways.
-    The cell of a teammate that may leave it, one behind a teammate, or one out of reach is taken if
-    no other is left.
-    """
-    u, turns = uavs[j], memory.plan.turns
-    zone, best, way, most = turns[j].zone, -1, -1, -1
-    for cell in range(len(chart.parking)):
-        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-        if chart.zones[y, x] != zone or memory.taken[cell] == _TAKEN:
-            continue
-        cells = path_length(mission, uavs, j, chart, None, u.x, u.y, x, y)
-        spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
-        farthest = chart.zones.size
-        for other in later:
-            if turns[other].zone == zone and uavs[other].zone != zone:
-                farthest = min(farthest, distance(chart, uavs[other].x, uavs[other].y, x, y))
-        is_occupied = memory.taken[cell] == _OCCUPIED and cells > 0
-        is_behind = cells > distance(chart, u.x, u.y, x, y) or _is_behind(uavs, j, chart, x, y)
-        if is_occupied or is_behind or spent >= usable_battery(mission, u):
-            farthest = 0
-        if best < 0 or farthest > most or (farthest == most and cells < way):
-            best, way, most = cell, cells, farthest
-    return best, way
-
-
-@inlined
-def _is_behind(uavs, j, chart, x, y):
-    """Whether a UAV that is in a zone may have to pass a teammate there to get to a cell."""
-    u = uavs[j]
-    if u.zone < 0:
-        return False
-    for k in range(len(uavs)):
-        o = uavs[k]
-        if k == j or not o.active or o.zone != u.zone:
-            continue
-        past = distance(chart, u.x, u.y, o.x, o.y) + distance(chart, o.x, o.y, x, y)
-        if past == distance(chart, u.x, u.y, x, y):
-            return True
-    return False
 
 
 @inlined

@@ -54,6 +54,8 @@ _AS_ASKED, _URGENT_FIRST, _BY_DEADLINE = range(3)
 TURN = np.dtype(
     [
         ("zone", np.int64),  # the zone where it will charge, -1 if it need not
+        # The number of its cell in a full zone, else -1 (``dess.model.guard.matching``).
+        ("cell", np.int64),
         # The slots to the nearest cell of each zone, and the battery that this takes.
         ("way", np.int64, MOST_ZONES),
         ("spent", np.int64, MOST_ZONES),

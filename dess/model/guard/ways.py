@@ -45,6 +45,15 @@ def is_crowded(mission, chart, zone):
 
 
 @inlined
+def is_tight(mission, chart):
+    """Whether all UAVs together would fill some zone."""
+    fewest = mission.uavs + 1
+    for zone in range(mission.zones):
+        fewest = min(fewest, chart.sizes[zone])
+    return fewest <= mission.uavs
+
+
+@inlined
 def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     """Cells that UAV ``i`` flies from one to another, with a detour around teammates.
 
@@ -53,8 +62,9 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     length, between, beside = distance(chart, x, y, to_x, to_y), 0, 0
     for j in range(mission.uavs):
         closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
-        if planned is not None and closed_x == to_x and closed_y == to_y:
-            continue  # it waits there for its turn in this cell
+        is_there = closed_x == to_x and closed_y == to_y
+        if is_there and (planned is not None or is_tight(mission, chart)):
+            continue  # it leaves the cell, or the UAV waits there for its turn in it
         if closed_x >= 0:
             before = distance(chart, x, y, closed_x, closed_y)
             more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dess import load_scenario
 from dess.analysis import run_study
 from dess.analysis.answers import missions
-from dess.analysis.results.resimulate import Mission
+from dess.analysis.results.resimulate import LoggedMission
 from tests.analysis.small import SHEET, grid, small_study, write_scenario
 
 
@@ -33,7 +33,7 @@ def test_kept_logs_are_those_that_the_study_keeps(results, tmp_path):
     assert steps == [(1, 2), (2, 2)]
     kept = missions.kept_missions(results, WANTED, tmp_path)
     for (policy, replication), mission in zip(WANTED, kept, strict=True):
-        same = Mission.of(results, policy, 0, replication)
+        same = LoggedMission.of(results, policy, 0, replication)
         pd.testing.assert_frame_equal(mission.events, same.events)
         assert mission.record.equals(same.record) and mission.scenario == same.scenario
     files = {path: path.read_bytes() for path in (tmp_path / missions.FOLDER).iterdir()}
@@ -154,14 +154,14 @@ def test_any_straight_line_makes_sectors(angle, offset):
         ),
     ],
 )
-def test_the_fate_of_a_mission_says_whether_uavs_can_fly_home(
+def test_the_end_of_a_mission_says_whether_uavs_can_fly_home(
     scenario, ends, batteries, words, tmp_path
 ):
     """A mission without a quota fills none, and a UAV that has landed is home."""
     space = load_scenario(write_scenario(tmp_path, **scenario))
     uavs = pd.DataFrame({"end": ends, "battery": batteries, "way_home": 8})
-    mission = Mission("greedy", space, {}, uavs, pd.DataFrame())
-    assert missions.fate_in_words(mission) == words
+    mission = LoggedMission("greedy", space, {}, uavs, pd.DataFrame())
+    assert missions.end_in_words(mission) == words
 
 
 def test_the_answer_counts_the_uavs_that_run_empty():

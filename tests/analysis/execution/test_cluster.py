@@ -18,7 +18,7 @@ from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK
 from dess.analysis.execution.workers import Cluster, _check_and_run
 from dess.analysis.results.chunks import Chunk
-from dess.analysis.results.manifest import Manifest, Part
+from dess.analysis.results.manifest import CellPart, Manifest
 from dess.analysis.results.provenance import engine_code, members_of
 from dess.reports import cli
 from tests.analysis.small import environment, files_of, small_study
@@ -39,7 +39,7 @@ if __name__ == "__main__":
 def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     study = small_study(tmp_path)
     cell = Manifest.of(study).cells[0][0]
-    chunk = Chunk(0, (Part(cell, range(1)),))
+    chunk = Chunk(0, (CellPart(cell, range(1)),))
     job = MissionsJob(chunk, (study.scenarios[0],), "greedy", 7, "batch")
     code, members = engine_code(), members_of("greedy")
     assert len(_check_and_run(job, code, members).missions) == 1

@@ -12,7 +12,7 @@ from dess.analysis import load_results, run_study
 from dess.analysis.bound import Bound
 from dess.analysis.execution import jobs, runner
 from dess.analysis.results.chunks import Chunk
-from dess.analysis.results.manifest import Part
+from dess.analysis.results.manifest import CellPart
 from dess.analysis.results.parquet import table_of_bounds, write
 from dess.analysis.results.store import Store
 from tests.analysis.small import files_of, small_study
@@ -129,7 +129,7 @@ def test_a_bound_that_cannot_be_computed_is_a_failure_of_its_chunk(tmp_path, mon
 def test_two_files_with_different_bounds_of_a_mission_are_refused(out, tmp_path):
     """Such as after files of two folders were merged."""
     manifest = Store.read(out).manifest
-    part = Part(manifest.bound_cells[0], range(2, 4))
+    part = CellPart(manifest.bound_cells[0], range(2, 4))
     chunk = Chunk(part.cell.team, (part,))
     other = [Bound(0.5, np.ones((1, NODES)), np.array([9]), 1)] * 2
     write(out / "bounds", chunk.name, table_of_bounds(chunk, other))
@@ -140,7 +140,7 @@ def test_two_files_with_different_bounds_of_a_mission_are_refused(out, tmp_path)
 @pytest.mark.parametrize("prices", [np.ones((2, 2)), np.zeros((0, 3))])
 def test_prices_that_are_not_as_many_for_every_cut_are_damaged(out, prices):
     manifest = Store.read(out).manifest
-    chunk = Chunk(-1, (Part(manifest.bound_cells[0], range(20, 21)),))
+    chunk = Chunk(-1, (CellPart(manifest.bound_cells[0], range(20, 21)),))
     cuts = np.arange(3 if len(prices) else 0)
     table = table_of_bounds(chunk, [Bound(1.0, prices, cuts, 4)])
     path = write(out / "bounds", chunk.name, table)

@@ -11,7 +11,7 @@ from dess.analysis import load_results, load_study, run_study
 from dess.analysis.execution import runner
 from dess.analysis.results import parquet, provenance
 from dess.analysis.results.chunks import Chunk, split_into_chunks
-from dess.analysis.results.manifest import Cell, Part
+from dess.analysis.results.manifest import Cell, CellPart
 from dess.analysis.results.store import Failure, Store, gaps_between
 from dess.policies import load
 from tests.analysis.small import files_of, small_study, write_scenario
@@ -232,7 +232,7 @@ def test_a_long_team_has_a_short_folder(tmp_path):
 def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
     study = small_study(tmp_path)
     with Store.open(study, tmp_path / "out") as store:
-        chunk = Chunk(0, (Part(store.manifest.cells[0][0], range(2)),))
+        chunk = Chunk(0, (CellPart(store.manifest.cells[0][0], range(2)),))
         path = store.write_failure(chunk, Failure("greedy", 2, "no", "dess", ""))
         assert path.exists()
         records = simulate_batch(study.scenarios[0], load("greedy"), 7, 2)
@@ -242,7 +242,7 @@ def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
 
 def test_chunks_have_their_size_and_one_team():
     cells = [Cell(1, point, f"{point}", 0) for point in (0, 1, 2)]
-    chunks = [*split_into_chunks([Part(cell, range(3)) for cell in cells], 4)]
+    chunks = [*split_into_chunks([CellPart(cell, range(3)) for cell in cells], 4)]
     assert [(c.team, c.rows) for c in chunks] == [
         (1, [("0", 0, 3), ("1", 0, 1)]),
         (1, [("1", 1, 3), ("2", 0, 2)]),

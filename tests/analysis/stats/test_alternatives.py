@@ -51,7 +51,7 @@ def test_of_ages_the_lower_is_better_and_a_rare_one_is_the_largest():
 
 
 def test_after_a_search_the_tests_have_the_errors_of_their_looks():
-    """Look k of a setting has the share 1 / (k (k + 1)) of the error of each pair."""
+    """PointStyle k of a setting has the share 1 / (k (k + 1)) of the error of each pair."""
     values = np.random.default_rng(4).normal(size=(15, 8)) + np.linspace(0, 1.5, 8)
     later = np.full(8, 2)
     assert may_be_best(values, looks=later).tolist() == by_hand(values, 1 - 0.05 / 6).tolist()

@@ -67,6 +67,24 @@ def test_no_other_matching_has_a_lower_price(seed):
     assert prices[np.arange(uavs), zones].sum() == least
 
 
+def test_who_comes_first_to_a_full_zone_flies_on_to_the_deeper_cell():
+    """The one behind it would fly around it; if it charges, it stays."""
+    zones = [{"cells": [22, 1, 2, 1], "pads": 1}]
+    first, second = {"x": 22, "y": 1, "battery": 9}, {"x": 20, "y": 1, "battery": 9}
+    assert _homes([first, second], **LANDING | {"zones": zones}) == [(23, 1), (22, 2)]
+    charging = first | {"charging": True, "pad_request": 1}
+    assert _homes([charging, second], **LANDING | {"zones": zones}) == [(22, 0), (23, 5)]
+
+
+def test_a_cell_that_parked_uavs_close_off_does_not_count():
+    """The corner of a zone of four cells: there is one cell for two UAVs."""
+    sea = LANDING | {"zone": [0, 0, 2, 3], "zones": [{"cells": [22, 0, 2, 2], "pads": 2}]}
+    parked = {"charging": True, "pad_request": 1, "battery": 20}
+    team = [parked | {"x": 22, "y": 0}, parked | {"x": 23, "y": 1}]
+    team += [{"x": x, "y": 1, "battery": 20} for x in (16, 15)]
+    assert _homes(team, **sea)[2:] == [(22, 6), (1, 14)]
+
+
 def test_where_missions_go_on_in_the_air_uavs_take_turns_in_a_cell():
     """The first UAV charges from 20 to 80 % in 6 slots; then the other one takes its cell."""
     waiting = {"latch": True, "pad_request": -1, "executed": HOVER}
