@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import inf
 from typing import Any, Literal
 
@@ -16,6 +17,9 @@ from dess.scenario.quantities import measured, printed
 from dess.scenario.scenario import ScenarioSpace
 
 Kind = Literal["outcome", "share", "number", "cost"]
+# The metrics of the paper, of what else every mission has (reward, way home), of studies with
+# bounds and with prices, of operations beyond the paper, and of amounts and times in records.
+Group = Literal["paper", "reward", "home", "bounds", "prices", "operations", "amounts"]
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,7 @@ class Metric:
             and tests hold for so many at once (``level_of_each``).
         told_unit: The unit in which a time is told that somebody has asked for in it, such as
             ``min``; empty for ``unit``. Its columns stay in ``unit``.
+        group: The missions that have it (``metric_group``); None if nothing is known of it.
     """
 
     column: str
@@ -70,6 +75,7 @@ class Metric:
     grows: bool = False
     among: int = 1
     told_unit: str = ""
+    group: Group | None = None
 
     def level_of_each(self, level: Any) -> Any:
         """The level of the interval of each node so that those of all hold together at a level.
@@ -211,27 +217,6 @@ _SLOTS, _DATA = "mission slots", "data units"
 _UNITS = {"min": ("slot", 60.0), "h": ("slot", 3600.0), "MB": ("data", 8e6), "km": ("cell", 1e3)}
 # The units of maps, of curves over time and of the player, where there is a data sheet.
 DRAWN_UNITS = {"length": "km", "time": "h", "data": "MB"}
-# A metric is declared once, in the list of the missions that have it: wherever metrics are chosen,
-# they come from these lists. Every mission has the paper's metrics, in its order (Section VI-A). It
-# calls them successful communication, collection ratio, and collection ratio and communication; the
-# last is here the product of each mission.
-_PAPER = (
-    Metric(SUCCESS, "Success", kind="outcome", in_percent=True),
-    Metric(RATIO, "Collection ratio", kind="share", in_percent=True),
-    Metric(PRODUCT, "Product", kind="share", in_percent=True),
-)
-# What policies are compared by.
-_OF_MISSIONS = (*_PAPER, Metric(REWARD, "Reward", failure=FAILURE_COST))
-# The shares that every mission has beside these.
-_BESIDE = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
-# What only the missions of studies with bounds have, and those of studies with prices.
-_OF_BOUNDS = (
-    Metric(BOUND, "Upper bound", least=0.0, most=1.0, fails=False),
-    Metric(GAP, "Optimality gap", less_is_better=True, least=0.0, most=1.0),
-)
-_OF_PRICES = (Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),)
-# The columns that results of earlier versions lack, the latest first.
-ADDED = (HOME,)
 # The columns of the longest that each mission may last, and that a UAV may wait for a pad in it.
 MOST_SLOTS, MOST_WAITING = "most_slots", "most_waiting"
 # The columns of the least and the most that each mission may cost.
@@ -280,9 +265,26 @@ def _amount_metric(
     )
 
 
+# A metric is declared once, in the group of the missions that have it: wherever metrics are chosen,
+# they come from ``metric_group``. Every mission has the paper's metrics, in its order (Section
+# VI-A). It calls them successful communication, collection ratio, and collection ratio and
+# communication; the last is here the product of each mission.
+_GROUPS: dict[Group, tuple[Metric, ...]] = {}
+_GROUPS["paper"] = (
+    Metric(SUCCESS, "Success", kind="outcome", in_percent=True),
+    Metric(RATIO, "Collection ratio", kind="share", in_percent=True),
+    Metric(PRODUCT, "Product", kind="share", in_percent=True),
+)
+_GROUPS["reward"] = (Metric(REWARD, "Reward", failure=FAILURE_COST),)
+_GROUPS["home"] = (Metric(HOME, "Battery for the way home", kind="outcome", in_percent=True),)
+_GROUPS["bounds"] = (
+    Metric(BOUND, "Upper bound", least=0.0, most=1.0, fails=False),
+    Metric(GAP, "Optimality gap", less_is_better=True, least=0.0, most=1.0),
+)
+_GROUPS["prices"] = (Metric(COST, "Cost", kind="cost", less_is_better=True, least=0.0, grows=True),)
 # Numbers beyond the paper: those of ``OPERATIONS``, which only extended scenarios measure, and, if
 # there are such, those of ``MISSION_RECORD`` that are shown like these.
-_MEASURED = (
+_GROUPS["operations"] = (
     # An age grows with time, so the mean of a node that nothing reaches is half of the horizon.
     _time_metric(AGE, "Age of information", horizons=0.5, grows=True),
     _time_metric("peak_age", "Peak age of information", grows=True),
@@ -305,7 +307,7 @@ _MEASURED = (
     _time_metric("slots_grounded", "Time under repair", is_sum=True),
 )
 # What records have in slots and data units; there is a metric of each in the units of a data sheet.
-_RECORDED = (
+_GROUPS["amounts"] = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
     _time_metric(MOST_WAITING, "Longest that a UAV may wait for a pad"),
@@ -316,7 +318,7 @@ _RECORDED = (
     _time_metric("charging_per_uav", "Charging per UAV", "min"),
     _time_metric("waiting_per_uav", "Waiting per UAV", "min"),
 )
-_ALL = (*_OF_MISSIONS, *_BESIDE, *_OF_BOUNDS, *_OF_PRICES, *_MEASURED, *_RECORDED)
+_ALL = tuple(replace(m, group=name) for name, group in _GROUPS.items() for m in group)
 _IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in _ALL}
 _KNOWN = {metric.column: metric for metric in _ALL}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
@@ -335,17 +337,26 @@ NODES_BEHIND = {
     OLDEST: NODE_AGES,
     _IN_SHEET_UNIT[OLDEST]: f"{NODE_AGES}_{_KNOWN[OLDEST].sheet_unit}",
 }
-METRICS = {metric.column: metric.name for metric in _PAPER}  # the paper's metrics, with their names
-MEASURES = {metric.column: metric for metric in _MEASURED}
-# As they are measured, and in the units of data sheets.
-EITHER = MEASURES | {metric.in_units.column: metric.in_units for metric in _MEASURED}
-ALWAYS = tuple(metric.column for metric in _OF_MISSIONS)  # the metrics of every mission
-BESIDE = {metric.column: metric.name for metric in _BESIDE}  # also of every mission, with names
-_MEASURED_ALWAYS = tuple(name for name in MISSION_RECORD.names or () if name in MEASURES)
-# All of every mission, in the order in which means are listed.
-RECORDED = tuple(dict.fromkeys((SUCCESS, *BESIDE, *ALWAYS, *_MEASURED_ALWAYS)))
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
+
+
+@cache
+def metric_group(*groups: Group, in_units: bool = False) -> dict[str, Metric]:
+    """The metrics of some groups by their columns, one group after the other.
+
+    Args:
+        *groups: The groups.
+        in_units: Whether those in the units of data sheets are among them.
+    """
+    found = {m.column: m for group in groups for m in _ALL if m.group == group}
+    if in_units:
+        return found | {metric.in_units.column: metric.in_units for metric in found.values()}
+    return found
+
+
+# The paper's metrics, with their names.
+METRICS = {column: metric.name for column, metric in metric_group("paper").items()}
 
 
 def metric_of(column: str | Metric) -> Metric:
@@ -537,19 +548,24 @@ def measured_in(missions: Container[str]) -> list[str]:
 
     Those in units of a data sheet come in the place of those in slots and data units.
     """
-    return [column_in_sheet_unit(name, missions) for name in MEASURES if name in missions]
+    return [
+        column_in_sheet_unit(name, missions)
+        for name in metric_group("operations")
+        if name in missions
+    ]
 
 
 def metrics_in(missions: Container[str]) -> list[str]:
     """The metrics that a table of missions has: those of the paper, then all others."""
-    others = [m.column for m in (*_BESIDE, *_OF_BOUNDS) if m.column in missions]
+    others = [column for column in metric_group("home", "bounds") if column in missions]
     others = [column_in_sheet_unit(column, missions) for column in others]
-    return [*ALWAYS, *others, *measured_in(missions)]
+    return [*metric_group("paper", "reward"), *others, *measured_in(missions)]
 
 
 def told_metrics(missions: Container[str]) -> list[str]:
     """The metrics that can be told of missions: those that they have, then their cost."""
-    return [*metrics_in(missions), *(m.column for m in _OF_PRICES if m.column in missions)]
+    costs = [column for column in metric_group("prices") if column in missions]
+    return [*metrics_in(missions), *costs]
 
 
 def check_metric(metric: str, missions: Container[str]) -> None:
@@ -611,4 +627,16 @@ def longest_wait(space: ScenarioSpace) -> int:
 def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
     """The metrics of the missions of a scenario, as they are measured."""
     of_nodes = [LEAST, OLDEST] if space.units else []
-    return metrics_in([*BESIDE, *_MEASURED_ALWAYS, *measures_of(space), *of_nodes])
+    measured = [*_measured_always(), *measures_of(space), *of_nodes]
+    return metrics_in([*metric_group("home"), *measured])
+
+
+def recorded_metrics() -> list[str]:
+    """The metrics that the record of every mission has, in the order in which means are listed."""
+    of_all = metric_group("home", "paper", "reward")
+    return [*dict.fromkeys((SUCCESS, *of_all, *_measured_always()))]
+
+
+def _measured_always() -> list[str]:
+    operations = metric_group("operations")
+    return [name for name in MISSION_RECORD.names or () if name in operations]

@@ -7,12 +7,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import (
-    BESIDE,
-    METRICS,
-    PRODUCT,
-    metric_of,
-)
+from dess.analysis.metrics import METRICS, PRODUCT, metric_group, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.stats.intervals import LEVEL
 from dess.analysis.stats.verdict import MARKS, judge_by_tests
@@ -30,7 +25,8 @@ CHECKED = f"The check of the selected settings: means with {INTERVALS}"
 MOST_PRINTED = 20  # the largest number of rows of a table that the terminal prints
 MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
-_HEADS = {"policy": "Policy", "n": "Missions", **METRICS, **BESIDE}
+_HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
+_HEADS |= {column: metric.name for column, metric in metric_group("home").items()}
 
 
 class Table(NamedTuple):

@@ -12,12 +12,12 @@ from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
 from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import (
-    ALWAYS,
     HOME,
     METRICS,
     PRODUCT,
     RATIO,
     SUCCESS,
+    metric_group,
     metric_in_missions,
     metric_of,
     ranking_column,
@@ -341,7 +341,7 @@ def worst_missions(
     if point is not None:
         of_policy = of_policy[of_policy["point"] == point]
     table = of_policy.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)[:missions]
-    table = table[["policy", "point", "replication", *ALWAYS]]
+    table = table[["policy", "point", "replication", *metric_group("paper", "reward")]]
     keys = zip(table["point"], table["replication"], strict=True)
     folder = folder or results.usual_folder
     return table.assign(command=[results.command(policy, *key, folder) for key in keys])

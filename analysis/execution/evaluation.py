@@ -25,10 +25,10 @@ from dess.analysis.execution.workers import Here, Pool
 from dess.analysis.metrics import (
     METRICS,
     NODES_BEHIND,
-    RECORDED,
     columns_in_units,
     measured_in,
     metric_in_space,
+    recorded_metrics,
 )
 from dess.analysis.results.chunks import split_into_chunks
 from dess.analysis.results.manifest import Cell, CellPart
@@ -189,7 +189,7 @@ def of_results(results: Results) -> list[Evaluation]:
     """The evaluations of the teams of a study that has the scenario as its only design point."""
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
-        metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in RECORDED}
+        metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in recorded_metrics()}
         measured = [name for name in OPERATIONS.names or () if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             if name not in NODES_BEHIND:
@@ -248,7 +248,7 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
 
 def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarray]:
     """The values of every metric that some of the missions have measured, in units as well."""
-    values = {metric: records.missions[metric] for metric in RECORDED}
+    values = {metric: records.missions[metric] for metric in recorded_metrics()}
     if len(records.operations):
         values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
     if space.units:

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from pydantic import Field, TypeAdapter
 
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import ADDED, NODE_AGES, NODE_RATIOS
+from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT, parquet_of
@@ -88,7 +88,7 @@ EVENTS = pa.schema(
 # The columns that files of earlier versions lack, the latest first. Version 0.2 had no ways home,
 # and fewer columns of the event log; earlier ones of version 0.3 do not say what was charged and
 # which UAVs are down.
-_ADDED_TO_MISSIONS = [(column,) for column in ADDED]
+_ADDED_TO_MISSIONS = ((HOME,),)
 _ADDED_TO_UAVS = (("charged", "down"), ("way_home",))
 _ADDED_TO_EVENTS = (tuple(EVENTS.names[7:]),)
 

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dess import InputError, simulate
 from dess.analysis import numbers
-from dess.analysis.metrics import ADDED, NODE_AGES, NODE_RATIOS, format_length, without_nodes
+from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS, format_length, without_nodes
 from dess.analysis.results.event_log import causes_of_failure
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.tables import Results
@@ -248,7 +248,7 @@ class Evidence(Origin):
         for mission in self.sample:
             if mission.policy not in policies:
                 raise ValueError(f"sample: {mission.policy} is not a policy of the study")
-            names = [name for name in MISSION_RECORD.names or () if name not in ADDED]
+            names = [name for name in MISSION_RECORD.names or () if name != HOME]
             if missing := [name for name in names if name not in mission.record]:
                 raise ValueError(f"sample: a record has no {missing[0]}")
         return self

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import BOUND, EITHER, GAP, PRODUCT
+from dess.analysis.metrics import BOUND, GAP, PRODUCT, metric_group
 from dess.analysis.names import SWEEP, SWEEPS
 from dess.analysis.results.manifest import Cell, Manifest
 from dess.analysis.results.provenance import Origin
@@ -371,7 +371,8 @@ def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def _label_missions(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
-    table = table.drop(columns=[m for m in EITHER if m in table and table[m].isna().all()])
+    beyond = metric_group("operations", in_units=True)
+    table = table.drop(columns=[m for m in beyond if m in table and table[m].isna().all()])
     for position, (name, values) in enumerate(_swept_fields(manifest).items(), 2):
         table.insert(position, name, table["point"].map(dict(enumerate(values))))
     return table

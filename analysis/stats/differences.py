@@ -11,7 +11,7 @@ import scipy
 from scipy.special import stdtr, stdtrit
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, EITHER, REWARD, Metric, metric_in_missions, metric_of
+from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_missions, metric_of
 from dess.analysis.stats import intervals
 
 Treatment = Literal["policy", "point"]
@@ -37,7 +37,7 @@ def metrics_by_treatment(
         raise InputError("by", f"{of} is what is compared", "other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
-        if metric in EITHER:
+        if metric in metric_group("operations", in_units=True):
             values = values[missions[metric].notna()]
         if odd := int(len(values) - np.isfinite(values).sum()):
             raise InputError(metric, f"no number in {odd} missions", "finite numbers")
@@ -424,7 +424,7 @@ def relative_change(
 def compare(
     missions: pd.DataFrame,
     baseline: str | int,
-    metrics: Sequence[str] = ALWAYS,
+    metrics: Sequence[str] = (*metric_group("paper", "reward"),),
     by: Sequence[str] = (),
     level: float = intervals.LEVEL,
     correction: Correction | None = "holm",

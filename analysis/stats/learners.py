@@ -13,7 +13,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import ALWAYS, Metric, metric_in_missions
+from dess.analysis.metrics import Metric, metric_group, metric_in_missions
 from dess.analysis.stats.differences import (
     Correction,
     add_adjusted,
@@ -114,7 +114,7 @@ def compare_learners(
     missions: pd.DataFrame,
     learners: Mapping[str, Sequence[str]],
     baseline: str,
-    metrics: Sequence[str] = ALWAYS,
+    metrics: Sequence[str] = (*metric_group("paper", "reward"),),
     by: Sequence[str] = (),
     level: float = LEVEL,
     correction: Correction | None = "holm",

@@ -15,14 +15,7 @@ from pydantic import (
 )
 
 from dess import InputError
-from dess.analysis.metrics import (
-    ALWAYS,
-    MEASURES,
-    NODES_BEHIND,
-    Metric,
-    metric_in_missions,
-    metric_of,
-)
+from dess.analysis.metrics import NODES_BEHIND, Metric, metric_group, metric_in_missions, metric_of
 from dess.analysis.stats.intervals import (
     LEVEL,
     ends_of_means,
@@ -33,7 +26,7 @@ from dess.analysis.stats.intervals import (
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
-_METRICS = [*ALWAYS, *MEASURES]
+_TARGETS = metric_group("paper", "reward", "operations")
 
 # For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
 Samples = Sequence[Mapping[str, np.ndarray]]
@@ -51,12 +44,12 @@ def _check_printable(text: str) -> str:
 
 
 def _check_metric(metric: str) -> str:
-    if metric not in _METRICS:
-        raise unknown_name("", f"{shown(metric)} is unknown", metric, _METRICS)
+    if metric not in _TARGETS:
+        raise unknown_name("", f"{shown(metric)} is unknown", metric, _TARGETS)
     return metric
 
 
-# A metric of missions; those of ``MEASURES`` only where the scenario measures them.
+# A metric of missions; those of operations only where the scenario measures them.
 MetricName = Annotated[str, AfterValidator(_check_metric)]
 # A line of text, such as a name.
 Line = Annotated[str, AfterValidator(_check_printable)]
@@ -278,7 +271,7 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
         InputError: If the scenario does not measure it.
     """
     if metric not in sample:
-        present = [name for name in _METRICS if name in sample]
+        present = [name for name in _TARGETS if name in sample]
         raise InputError(metric, "is not measured by the scenario", listed(present))
     return np.asarray(sample[metric], float)
 

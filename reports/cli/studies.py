@@ -281,15 +281,16 @@ def _load_folder(folder: Path, begun: bool = False) -> "Results":
 
 def _parse_targets(texts: Iterable[str]) -> dict[str, float]:
     """Metric -> the least mean, or the largest of a metric of which less is better."""
-    from dess.analysis.metrics import ALIASES, MEASURES, METRICS
+    from dess.analysis.metrics import ALIASES, METRICS, metric_group
 
+    operations = metric_group("operations")
     targets = {}
     for name, share in options.parse_all_settings(texts, "--target", TARGET).items():
-        if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
-            names = [*METRICS, *ALIASES, *MEASURES]
+        if (metric := ALIASES.get(name, name)) not in METRICS | operations:
+            names = [*METRICS, *ALIASES, *operations]
             raise unknown_name("--target", f"{name!r} is unknown", name, names)
         is_number = isinstance(share, int | float) and not isinstance(share, bool)
-        if metric in MEASURES and not (is_number and share >= 0):
+        if metric in operations and not (is_number and share >= 0):
             raise InputError(f"--target: {name}", f"{share!r} is not allowed", "0 or more")
         if metric in METRICS and not (is_number and 0 <= share <= 1):
             raise InputError(f"--target: {name}", f"{share!r} is not a share", "0..1")

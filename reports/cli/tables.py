@@ -13,13 +13,13 @@ from dess.analysis.answers.settings.points import points_in_words, setting_in_wo
 from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.answers.settings.sobol import index_table
 from dess.analysis.metrics import (
-    EITHER,
     METRICS,
     PRODUCT,
     RATIO,
     SUCCESS,
     Metric,
     measured_in,
+    metric_group,
     metric_of,
 )
 from dess.analysis.paper import values
@@ -197,7 +197,7 @@ def _print_means(
     if printed:
         cells.loc["paper"] = [numbers.format_percent(printed[metric]) for metric in METRICS]
     print_frame(title, cells)
-    others = {*EITHER, *also}.difference(METRICS)
+    others = {*metric_group("operations", in_units=True), *also}.difference(METRICS)
     measured = means[means["metric"].isin(others)]
     if not measured.empty:
         cells = numbers.estimates_as_text(

@@ -10,12 +10,7 @@ from scipy.special import ndtri
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.figures import Drawing
-from dess.analysis.metrics import (
-    ALWAYS,
-    METRICS,
-    PRODUCT,
-    metric_of,
-)
+from dess.analysis.metrics import METRICS, PRODUCT, metric_group, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.intervals import (
@@ -75,7 +70,9 @@ def draw_indices(results: Results, metric: str = PRODUCT) -> Iterator[Drawing]:
 
 
 def sobol_indices(
-    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = ALWAYS
+    design: Saltelli,
+    missions: pd.DataFrame,
+    metrics: Sequence[str] = (*metric_group("paper", "reward"),),
 ) -> pd.DataFrame:
     """First-order and total Sobol indices of each metric to each parameter and to the noise.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dess import InputError
 from dess.analysis.answers.settings.points import points_in_words
-from dess.analysis.metrics import ALWAYS, METRICS, PRODUCT
+from dess.analysis.metrics import METRICS, PRODUCT, metric_group
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.base.errors import unknown_name
@@ -29,8 +29,9 @@ def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndar
         InputError: If there is no such metric, a policy has fewer missions than there are runs, or
             learners have different numbers of trainings.
     """
-    if metric not in ALWAYS:
-        raise unknown_name("metric", f"{metric!r} is unknown", metric, ALWAYS)
+    known = metric_group("paper", "reward")
+    if metric not in known:
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, known)
     algorithms = _policies_of_runs(results)
     points = range(len(results.store.manifest.points))
     runs = len(next(iter(algorithms.values())))

@@ -15,9 +15,9 @@ from dess.analysis.metrics import (
     METRICS,
     PRODUCT,
     RATIO,
-    RECORDED,
     check_metric,
     check_ranking_metric,
+    recorded_metrics,
 )
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.alternatives import BEST, ONLY, SEEN_BEST, TIED
@@ -140,7 +140,9 @@ def test_what_is_neither_better_nor_worse_ranks_nothing(metric):
     results = SimpleNamespace(missions=missions, looks=results.looks)
     means = means.assign(metric=metric)
     assert summary.add_verdicts(results, means)["verdict"].tolist() == [ONLY] * 2
-    missions = {name: 0 for name in (*RECORDED, "pad_requests", "utilisation", "generated")}
+    missions = {
+        name: 0 for name in (*recorded_metrics(), "pad_requests", "utilisation", "generated")
+    }
     check_metric(metric, missions)
     with pytest.raises(InputError, match="neither better nor worse"):
         check_ranking_metric(metric, missions)

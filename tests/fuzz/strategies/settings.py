@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from dess.analysis.metrics import MEASURES
+from dess.analysis.metrics import metric_group
 from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.steps import write
@@ -26,7 +26,7 @@ _DUPLICATES = (
 _SWEPT = ("uavs=1,1.0", "arrival_rate=0.0,-0.0", "uavs=2,2", "arrival_rate=0,0.0")
 # What the small sea does not measure, what has no price, and amounts of no use.
 _UNFIT = (
-    *[{"--metric": metric} for metric in (*MEASURES, "cost", "x" * 5000)],
+    *[{"--metric": metric} for metric in (*metric_group("operations"), "cost", "x" * 5000)],
     *[{"--require": text} for text in ("age=1", "success=2", "success=nan", "x=1", "cost=5")],
     *[{"--price": text} for text in ("uav=-1", "uav=nan", f"currency={'x' * 4000}", "x=1")],
     *[{"--name": name} for name in ("../a", "a/b", ".", "", "a" * 300)],
