@@ -15,7 +15,7 @@ from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
 from dess.analysis.metrics import NODE_RATIOS, RATIO, metric_of
-from dess.analysis.results.resimulate import Mission, resimulate
+from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import compare, differences_of, t_test
@@ -231,7 +231,7 @@ def _ratios_of_nodes(results: Results, point: int) -> np.ndarray:
     return np.stack([*missions.sort_values("replication")[NODE_RATIOS]])
 
 
-def _first_missions(results: Results, point: int) -> Iterator[Mission]:
+def _first_missions(results: Results, point: int) -> Iterator[LoggedMission]:
     """The first missions of a design point, simulated again."""
     policy = results.policies[0]
     missions = results.missions_of(policy)
