@@ -16,10 +16,10 @@ if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.analysis.results.resimulate import resimulate as resimulate
     from dess.analysis.results.tables import Results as Results
     from dess.analysis.results.tables import load_results as load_results
+    from dess.analysis.stats.bootstrap import bootstrap_interval as bootstrap_interval
     from dess.analysis.stats.differences import compare as compare
     from dess.analysis.stats.distribution import distribution as distribution
-    from dess.analysis.stats.intervals import bootstrap_interval as bootstrap_interval
-    from dess.analysis.stats.intervals import summary as summary
+    from dess.analysis.stats.groups import summary as summary
     from dess.analysis.stats.learners import compare_learners as compare_learners
     from dess.analysis.study.study import Study as Study
     from dess.analysis.study.study import load_study as load_study
@@ -36,9 +36,9 @@ _HOME = {
     "resimulate": "results.resimulate",
     "rliable_scores": "answers.training.exports",
     "marl_eval_data": "answers.training.exports",
-    "summary": "stats.intervals",
+    "summary": "stats.groups",
     "distribution": "stats.distribution",
-    "bootstrap_interval": "stats.intervals",
+    "bootstrap_interval": "stats.bootstrap",
     "compare": "stats.differences",
     "compare_learners": "stats.learners",
     "sweep": "ask.answer",

@@ -33,7 +33,7 @@ class Metric:
         kind: An ``outcome`` is 0 or 1 in each mission, and its mean has Wilson's interval. The
             values of a ``share`` lie between 0 and 1. How the interval of the mean of a ``number``
             and of a ``cost`` is computed depends on what is known of rare missions
-            (``stats.intervals.ends_of_means``).
+            (``stats.kinds.ends_of_means``).
         less_is_better: Whether a lower value is better.
         is_neutral: Whether neither more nor less of it is better: it describes missions, and ranks
             nothing.

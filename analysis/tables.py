@@ -9,7 +9,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.metrics import METRICS, PRODUCT, metric_group, metric_of
 from dess.analysis.names import field_named, value_text
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import MARKS, judge_by_tests
 
 INTERVALS = f"{numbers.format_level(LEVEL)} intervals"

@@ -17,7 +17,8 @@ from dess.analysis.answers.training.curves import read_curve
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.paper import values
 from dess.analysis.stats.differences import compare_pairs
-from dess.analysis.stats.intervals import interval_of, post_stratified
+from dess.analysis.stats.intervals import interval_of
+from dess.analysis.stats.weights import post_stratified
 from dess.base.files.reading import read_text
 from dess.base.files.writing import write_file
 from dess.policies.learner.config import MISSION_SEED, load_config, read_description

@@ -2,8 +2,12 @@
 
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.fleet.requirements import requirements_of
-from dess.analysis.answers.main_effects import draw_one_at_a_time
-from dess.analysis.answers.settings.figures import draw_curves, draw_main_effects, draw_scatter
+from dess.analysis.answers.settings.figures import (
+    draw_curves,
+    draw_main_effects,
+    draw_one_at_a_time,
+    draw_scatter,
+)
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.sobol import draw_indices
 from dess.analysis.answers.summary import draw_performance

@@ -17,7 +17,7 @@ from dess.analysis.results.event_log import Events
 from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import node_titles
-from dess.analysis.stats.intervals import summary
+from dess.analysis.stats.groups import summary
 from dess.base.files.reading import paths_in
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders

@@ -29,17 +29,19 @@ from dess.analysis.metrics import (
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import column_tests, relative_change
-from dess.analysis.stats.intervals import LEVEL, Interval, by_replication, check_share
+from dess.analysis.stats.differences import compare_pairs, relative_change
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_share
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
     INCONCLUSIVE,
     SEEN_ABOVE,
     SEEN_BELOW,
-    position_of,
-    position_with_allowance,
+    judge_intervals,
 )
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import WIDER, allowance_sentence
 
 # The published changes of the average age of information, from one UAV to this number, in another
@@ -134,8 +136,9 @@ def changes_from_reference(
                 plain = relative_change(*pairs)
                 change = (*relative_change(*pairs, measure), (plain.high - plain.low) / 2)
             else:
-                tests = column_tests(both[[point]], both[partner], measure)
-                change = tests[["difference", "low", "high", "student"]].iloc[0]
+                values = both.to_numpy(float)
+                pair = compare_pairs(values[:, 0], values[:, 1], metric=measure)
+                change = (*pair[:3], pair.student)
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])
 
@@ -301,7 +304,7 @@ def age_sentence(results: Results) -> str:
 def _judge_change(change: Any) -> str:
     """The verdict on a row of ``changes_from_reference``."""
     seen = Interval(change.mean, change.mean - change.student, change.mean + change.student)
-    return position_with_allowance(position_of(change), position_of(seen))
+    return judge_intervals(change, seen)
 
 
 def published_age_in_words() -> str:

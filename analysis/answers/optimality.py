@@ -10,7 +10,7 @@ from dess.analysis.answers import summary
 from dess.analysis.metrics import BOUND, GAP, PRODUCT
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.tables import Results, load_results
-from dess.analysis.stats.intervals import summary as means_of
+from dess.analysis.stats.groups import summary as means_of
 
 NOT_RUN = (
     "How far the policies are from the best possible is not known here: `dess study run gap` "

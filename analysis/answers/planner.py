@@ -24,7 +24,9 @@ from dess.analysis.results.event_log import uav_slots
 from dess.analysis.results.resimulate import LoggedMission
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare, difference_test, differences_of, t_test
-from dess.analysis.stats.intervals import LEVEL, column_intervals, summary
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import column_intervals
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
@@ -38,8 +40,7 @@ from dess.analysis.stats.verdict import (
     WORSE,
     better_or_worse,
     judge_difference,
-    position_of,
-    position_with_allowance,
+    judge_intervals,
 )
 from dess.analysis.tables import BARS
 from dess.policies.planner import Course, Planner, first_plan
@@ -198,7 +199,7 @@ def judge_nodes(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
     for ours, theirs in zip(shares.T, others.T, strict=True):
         whole, _ = difference_test(ours, theirs, metric, LEVEL)
         seen, _ = t_test(differences_of(ours, theirs), metric.level_of_each(LEVEL))
-        verdicts.append(position_with_allowance(position_of(whole), position_of(seen)))
+        verdicts.append(judge_intervals(whole, seen))
     return np.array(verdicts, object)
 
 

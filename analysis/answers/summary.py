@@ -32,16 +32,13 @@ from dess.analysis.stats.differences import (
     insert_adjusted,
 )
 from dess.analysis.stats.distribution import distribution
-from dess.analysis.stats.intervals import (
-    Interval,
-    by_replication,
-    level_after,
-    summary,
-    values_within,
-)
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.learners import compare_learners
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.stats.verdict import MARKS, Verdict, position_of
+from dess.analysis.stats.weights import by_replication, values_within
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
@@ -70,7 +67,7 @@ def means_of_points(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy, design point and metric, as ``dess.analysis.summary`` returns it. After a
-        search, the intervals allow for it (``stats.intervals.level_after``).
+        search, the intervals allow for it (``stats.kinds.level_after``).
     """
     cell = ["policy", "point"]
     looks = {name: results.looks(name) for name in results.policies}
@@ -314,6 +311,28 @@ def rank_learned_and_others(results: Results) -> tuple[list[str], list[str]]:
     others = [policy for policy in ranked if policy not in learned]
     heuristics = [policy for policy in others if policy in HEURISTICS]
     return [policy for policy in ranked if policy in learned], heuristics or others
+
+
+def leading_policies(
+    results: Results, learned: str | None = None, heuristic: str | None = None
+) -> list[str]:
+    """The best learned policy of a study, if it has one, and its best heuristic.
+
+    Args:
+        results: The study.
+        learned: The learned policy to take instead of the best one.
+        heuristic: The heuristic to take instead of the best one.
+
+    Raises:
+        InputError: If the study lacks a policy that is named.
+    """
+    for name in (learned, heuristic):
+        if name is not None:
+            results.check_policy(name)
+    all_learned, others = rank_learned_and_others(results)
+    learned = learned or next(iter(all_learned), None)
+    heuristic = heuristic or next(iter(others), None)
+    return [policy for policy in (learned, heuristic) if policy]
 
 
 def worst_missions(

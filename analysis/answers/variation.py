@@ -39,7 +39,7 @@ from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import add_adjusted, compare
-from dess.analysis.stats.intervals import LEVEL, by_replication
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
     ABOVE,
     BELOW,
@@ -50,6 +50,7 @@ from dess.analysis.stats.verdict import (
     SEEN_BELOW,
     judge_difference,
 )
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import Table
 from dess.scenario.fields import ZONE_PADS
 

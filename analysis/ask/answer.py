@@ -34,7 +34,7 @@ from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import scenario_notes
+from dess.analysis.sheet import as_sentences
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -135,23 +135,19 @@ class Answer:
             metric: The metric that ranks the settings, where there are no requirements. By default
                 the product.
         """
+        notes = as_sentences(self.question.notes)
         if self.question.is_comparison:
-            return [*map(strip_markdown, self.variation.sentences()), *self._notes()]
+            return [*map(strip_markdown, self.variation.sentences()), *notes]
         if self.question.study.selection:
             first, *others = search_of(self.results).sentences()
             sentences = (first, *brief_sentences(self.results), *others)
-            return [*map(strip_markdown, sentences), *self._notes()]
+            return [*map(strip_markdown, sentences), *notes]
         ranking = metric or PRODUCT
         ranked = rank_settings(self.results, ranking)
         lines = best_settings_sentences(self.results, ranked, ranking)
         if self.question.study.costs:
             lines.append(prices_in_words(self.results))
-        return [*lines, *self._notes()]
-
-    def _notes(self) -> list[str]:
-        """Which nodes no UAV can serve, the highest collection ratio, and zones that are small."""
-        sentences = scenario_notes(self.results.store.manifest.scenarios)
-        return [f"{sentence[0].upper()}{sentence[1:]}." for sentence in sentences]
+        return [*lines, *notes]
 
     def assumptions(self, metric: str | None = None) -> list[str]:
         """What the answer to a sweep of a scenario with a data sheet assumes; otherwise nothing.

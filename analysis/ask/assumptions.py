@@ -7,7 +7,7 @@ from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import battery_sentence, scenario_notes, type_sentences
+from dess.analysis.sheet import as_sentences, battery_sentence, scenario_notes, type_sentences
 from dess.physics.fleet import IN_UNITS
 from dess.scenario.data_sheet import LORA, DataSheet
 from dess.scenario.quantities import printed
@@ -71,10 +71,6 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
         f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
         f"{given('bandwidth', '')} with {_rates_of(space, varied)}{duty}.",
-        *(
-            f"{line[0].upper()}{line[1:]}."
-            for line in scenario_notes(results.store.manifest.scenarios)
-        ),
         f"Wind: {given('wind', 'none')}, the same everywhere and always. "
         f"{_battery_of(space, varied)}",
         *_types_of(space, varied),
@@ -84,19 +80,23 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
     ]
 
 
+def limit_sentences(results: Results) -> list[str]:
+    """Which nodes no UAV can serve, and which zones are small, for a page without the terminal."""
+    return as_sentences(scenario_notes(results.store.manifest.scenarios))
+
+
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery, in a sentence."""
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "What a slot takes of the battery follows from the speed through the air."
-    sentence = battery_sentence(space)
-    return f"{sentence[0].upper()}{sentence[1:]}."
+    return as_sentences([battery_sentence(space)])[0]
 
 
 def _types_of(space: ScenarioSpace, varied: set[str]) -> list[str]:
     """What follows for each type of UAVs, a sentence for each, unless the types vary."""
     if varied & {*IN_UNITS, "wind", "hover", "reserve", "tip_speed", "induced_speed", "fleet"}:
         return []
-    return [f"{line[0].upper()}{line[1:]}." for line in type_sentences(space)]
+    return as_sentences(type_sentences(space))
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:

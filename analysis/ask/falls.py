@@ -19,7 +19,7 @@ from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import compare, differences_of, t_test
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
     BELOW,
     INCONCLUSIVE,

@@ -28,8 +28,9 @@ from dess.analysis.metrics import NODES_BEHIND, columns_in_units, metric_of
 from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare_pairs
-from dess.analysis.stats.intervals import values_within, worst_node
 from dess.analysis.stats.verdict import Verdict, judge_margins
+from dess.analysis.stats.weights import values_within
+from dess.analysis.stats.worst_node import worst_node
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
 from dess.base.files.writing import write_file

@@ -9,9 +9,9 @@ changes of it.
 
 import json
 import os
-import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
 
@@ -38,10 +38,12 @@ from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
 from dess.analysis.results.tables import Results
+from dess.analysis.sheet import scenario_notes
 from dess.analysis.study.cheapest import Cheapest, Required
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.study import Study, study_from
+from dess.base.commands import command_line
 from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import is_read_only, toml_value, write_file
@@ -82,6 +84,11 @@ class Question:
         The design points are then the baseline and the variation.
         """
         return isinstance(self.study.design, TableDesign)
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """Which nodes no UAV can serve, the highest collection ratio, and zones that are small."""
+        return scenario_notes(self.study.scenarios)
 
     @property
     def file(self) -> Path:
@@ -154,37 +161,28 @@ class Question:
         design = self.study.design
         rule = self.study.selection
         if isinstance(design, TableDesign):
+            asked = WHAT_IF
             before, after = design.rows
             sides = {"set": after, "baseline": study.set | before}
-            words = [WHAT_IF]
-            for option, values in sides.items():
-                words += _option_per_value(
-                    option, _values_as_options({f: [value] for f, value in values.items()})
-                )
-            teams = list(study.policies)
+            options: dict[str, Any] = {
+                side: _values_as_options({f: [value] for f, value in values.items()})
+                for side, values in sides.items()
+            }
+            options["policy"] = list(study.policies)
         else:
             assert isinstance(design, GridDesign)
+            asked = "sweep"
             fixed = {field: (value,) for field, value in study.set.items()}
-            words = ["sweep", *_option_per_value("set", _values_as_options(fixed | design.values))]
-            teams = [",".join(study.policies)]
-        words += [word for team in teams for word in ("--policy", team)]
-        if isinstance(rule, Cheapest):
-            missions = rule.check
-        else:
-            missions = study.missions
-        words += ["--missions", str(missions), "--seed", str(study.seed)]
+            options = {"set": _values_as_options(fixed | design.values)}
+            options["policy"] = ",".join(study.policies)
+        options |= {"missions": study.missions, "seed": study.seed}
         if study.scenario != "paper":
-            words += ["--scenario", Path(study.scenario).name]
+            options["scenario"] = Path(study.scenario).name
         if study.costs:
-            words += _option_per_value("price", study.costs.model_dump(exclude_unset=True))
+            options["price"] = study.costs.model_dump(exclude_unset=True)
         if isinstance(rule, Cheapest):
-            words += _option_per_value("require", rule.requirements)
-        return shlex.join(["dess", *words])
-
-
-def _option_per_value(name: str, values: Mapping[Any, Any]) -> list[str]:
-    """``--NAME KEY=VALUE`` for every value."""
-    return [word for key, value in values.items() for word in (f"--{name}", f"{key}={value}")]
+            options |= {"missions": rule.check, "require": rule.requirements}
+        return command_line(asked, **options)
 
 
 def _values_as_options(values: Mapping[str, Iterable[Any]]) -> dict[str, str]:

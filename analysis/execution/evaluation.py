@@ -36,6 +36,8 @@ from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import Moments
+from dess.analysis.stats.weights import moments_of_space
+from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
 from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import check_seed, spaces_of
@@ -236,13 +238,13 @@ def _over_space(moments: ByFleet, space: ScenarioSpace, missions: int) -> dict[s
     over_space: dict[str, Moments] = {}
     by_node: dict[str, list[Moments]] = defaultdict(list)
     for key, by_fleet in moments.items():
-        whole = Moments.of_space([by_fleet.get(n) for n in fleets], missions)
+        whole = moments_of_space([by_fleet.get(n) for n in fleets], missions)
         if isinstance(key, str):
             over_space[key] = whole
         else:
             by_node[key[0]].append(whole)
     for metric, nodes in by_node.items():
-        over_space[metric] = Moments.of_worst_node(nodes, metric_in_space(metric, space))
+        over_space[metric] = moments_of_worst_node(nodes, metric_in_space(metric, space))
     return over_space
 
 

@@ -5,7 +5,6 @@ in whatever order the jobs are run. If a rule decides the number of missions, th
 rounds. What a round needs depends only on the missions of the rounds before.
 """
 
-import shlex
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
@@ -253,7 +252,7 @@ class _Run:
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """The failure of a job, with a command that reproduces it by a mission or by the study."""
-        command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
+        command = self.study.command(self.store.folder)
         if (mission := problem.mission) and not isinstance(job, BoundsJob):
             which = mission.cell, mission.replications[0]
             command = tables.of_folder(self.store.folder, self.store.manifest, *which)

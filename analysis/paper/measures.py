@@ -9,7 +9,9 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers import main_effects, missions
+from dess.analysis.answers import missions
+from dess.analysis.answers.settings import shapes
+from dess.analysis.answers.settings.effects import means_by_field
 from dess.analysis.answers.training.curves import last_phase, settling_position, smooth_curves
 from dess.analysis.answers.training.transfer import Transfer, compare_transfer
 from dess.analysis.answers.training.variants import LEARNED, last_rows
@@ -18,14 +20,9 @@ from dess.analysis.names import field_named, value_text
 from dess.analysis.paper import values
 from dess.analysis.paper.rules import MARGIN
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import (
-    LEVEL,
-    Interval,
-    bounded_interval,
-    mean_interval,
-    share_interval,
-)
-from dess.analysis.stats.intervals import summary as means_of
+from dess.analysis.stats.groups import summary as means_of
+from dess.analysis.stats.intervals import Interval, bounded_interval, mean_interval, share_interval
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
 
@@ -38,7 +35,7 @@ class Pairs(NamedTuple):
 
     Attributes:
         field: The parameter.
-        changes: The result of ``main_effects.compare_values``.
+        changes: The result of ``shapes.compare_values``.
         positions: The position of every value, by its text.
     """
 
@@ -47,9 +44,9 @@ class Pairs(NamedTuple):
     positions: Mapping[str, int]
 
     @property
-    def shape(self) -> main_effects.Shape:
+    def shape(self) -> shapes.Shape:
         """How the metric changes along the values."""
-        return main_effects.shape_of_changes(self.changes)
+        return shapes.shape_of_changes(self.changes)
 
     @property
     def course(self) -> str:
@@ -57,7 +54,7 @@ class Pairs(NamedTuple):
         shape = self.shape
         tops = [value for value, position in self.positions.items() if position in shape.peaks]
         peak = ""
-        if shape.words == main_effects.PEAK:
+        if shape.words == shapes.PEAK:
             peak = f", highest at {' or '.join(tops)}"
         differ = self.changes["p_adjusted"] <= 1 - LEVEL
         sure = self.changes.loc[differ, "difference"]
@@ -104,8 +101,8 @@ class EvidenceOfPolicy:
 
     @cached_property
     def effects(self) -> pd.DataFrame:
-        """The result of ``main_effects.means_by_field``."""
-        return main_effects.means_by_field(self.results)
+        """The result of ``effects.means_by_field``."""
+        return means_by_field(self.results)
 
     def missions(self, uavs: int | None = None) -> pd.DataFrame:
         """The missions of the policy, or only those with a number of UAVs.
@@ -130,9 +127,7 @@ class EvidenceOfPolicy:
         values = self.effects[self.effects["field"] == field].drop_duplicates("position")
         if len(values) < 2:
             raise MissingError(f"the study {self.study} does not vary {field}")
-        changes = main_effects.compare_values(
-            self.results, self.effects, self.policy, field, metric, fewest_uavs
-        )
+        changes = shapes.compare_values(self.results, self.policy, field, metric, fewest_uavs)
         return Pairs(field, changes, dict(zip(values["value"], values["position"], strict=True)))
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
@@ -530,12 +525,12 @@ def _mean_share(values: np.ndarray, name: str) -> Quantity:
 
 
 def _points_of_row(row: pd.Series, name: str = "") -> Quantity:
-    """A row of ``main_effects.compare_values``."""
+    """A row of ``shapes.compare_values``."""
     interval = Interval(*map(float, row[["difference", "low", "high"]]))
     return Quantity(interval, int(row["n"]), "points", name)
 
 
 def _widened_interval(row: pd.Series) -> Quantity:
-    """The interval of a row of ``main_effects.compare_values`` that holds for all rows at once."""
+    """The interval of a row of ``shapes.compare_values`` that holds for all rows at once."""
     interval = Interval(*map(float, row[["difference", "wide_low", "wide_high"]]))
     return Quantity(interval, int(row["n"]), "points", "widened for their number")

@@ -8,8 +8,8 @@ from collections.abc import Collection, Sequence
 
 import pandas as pd
 
-from dess.analysis.answers import main_effects
-from dess.analysis.answers.main_effects import Shape
+from dess.analysis.answers.settings import shapes
+from dess.analysis.answers.settings.shapes import Shape
 from dess.analysis.answers.training.transfer import Transfer
 from dess.analysis.paper.values import CROSSING
 from dess.analysis.stats import verdict
@@ -84,7 +84,7 @@ def never_all(ratio: Interval, whole: Interval) -> str:
     return verdict.judge_parts(never or None, ratio.high < 1 or None)
 
 
-# The values of a parameter. ``leads`` are rows of ``main_effects.compare_values``, with signs such
+# The values of a parameter. ``leads`` are rows of ``shapes.compare_values``, with signs such
 # that a difference is the value in question minus another value.
 
 
@@ -120,7 +120,7 @@ def alike(changes: pd.DataFrame, margin: float) -> str:
 
 def rises(shape: Shape) -> str:
     """Whether the metric rises along the values."""
-    verdicts = {main_effects.RISES: verdict.HOLDS, main_effects.LEVELS: verdict.INCONCLUSIVE}
+    verdicts = {shapes.RISES: verdict.HOLDS, shapes.LEVELS: verdict.INCONCLUSIVE}
     return verdicts.get(shape.words, verdict.REFUTED)
 
 
@@ -128,7 +128,7 @@ def peaks(shape: Shape, wanted: int) -> str:
     """Whether the metric rises up to a value and falls after it."""
     if wanted not in shape.peaks:
         return verdict.REFUTED
-    if shape.words == main_effects.PEAK:
+    if shape.words == shapes.PEAK:
         return verdict.HOLDS
     return verdict.INCONCLUSIVE
 

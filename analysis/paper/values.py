@@ -9,7 +9,8 @@ from dess.analysis.answers import summary
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import LEVEL, Interval, share_interval
+from dess.analysis.stats.intervals import Interval, share_interval
+from dess.analysis.stats.kinds import LEVEL
 
 # Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000

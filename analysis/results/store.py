@@ -46,7 +46,7 @@ from dess.analysis.results.manifest import (
     Manifest,
     Selected,
 )
-from dess.analysis.stats.intervals import worst_node
+from dess.analysis.stats.worst_node import worst_node
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import CHECK, Study
 from dess.base.files.reading import paths_in

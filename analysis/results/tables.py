@@ -1,7 +1,6 @@
 """The results of a study as tables, and the commands that make a mission of it again."""
 
 import json
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
@@ -22,6 +21,7 @@ from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Choice, Selection
 from dess.analysis.study.study import StudyData
+from dess.base.commands import command_line
 from dess.base.errors import unknown_name
 from dess.base.files.writing import toml_value
 from dess.model.record import MISSION_RECORD
@@ -38,12 +38,11 @@ def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: i
         cell: The team and the design point of the mission.
         replication: Of the mission.
     """
-    point = []
+    point = None
     if len(manifest.points) > 1:
-        point = ["--point", str(cell.point)]
+        point = cell.point
     policy = manifest.policies[cell.team].policy
-    which = [*point, "--policy", policy, "--replication", str(replication)]
-    return shlex.join(["dess", "simulate", "--of", str(folder), *which])
+    return command_line("simulate", of=folder, point=point, policy=policy, replication=replication)
 
 
 def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: int) -> str:
@@ -65,10 +64,10 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         paper = load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
         changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
-    settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={toml_value(v)}")]
+    settings = {key: toml_value(value) for key, value in dotted(changes).items()}
     acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
-    which = ["--policy", acting, "--seed", str(origin.seed), "--replication", str(replication)]
-    return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
+    which = {"policy": acting, "seed": origin.seed, "replication": replication}
+    return command_line("simulate", scenario=name, set=settings, **which)
 
 
 Given = ParamSpec("Given")

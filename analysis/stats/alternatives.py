@@ -12,7 +12,8 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from dess.analysis.metrics import Metric, metric_of
-from dess.analysis.stats.intervals import LEVEL, level_after, rare_differences
+from dess.analysis.stats.differences import rare_differences
+from dess.analysis.stats.kinds import LEVEL, level_after
 from dess.analysis.stats.verdict import SEEN_WORSE, WORSE
 
 # How an alternative compares with all others by a metric, beside ``SEEN_WORSE`` and ``WORSE``.
@@ -104,7 +105,7 @@ def may_be_best(
     Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
     that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research).
     After a search, whose numbers of missions depend on their results, each pair is tested at the
-    error of its look (``intervals.level_after``).
+    error of its look (``kinds.level_after``).
 
     Args:
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a

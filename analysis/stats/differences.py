@@ -8,11 +8,14 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.special import stdtr, stdtrit
+from scipy.special import stdtr
 
 from dess import InputError
 from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_missions, metric_of
-from dess.analysis.stats import intervals
+from dess.analysis.stats.intervals import Interval, mean_interval
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_columns, check_share, group_rows
+from dess.analysis.stats.weights import values_within
 
 Treatment = Literal["policy", "point"]
 
@@ -32,7 +35,7 @@ def metrics_by_treatment(
     """
     if of not in get_args(Treatment):
         raise InputError("of", repr(of), ", ".join(get_args(Treatment)))
-    intervals.check_columns(missions, [of, "replication", *metrics, *by])
+    check_columns(missions, [of, "replication", *metrics, *by])
     if of in by:
         raise InputError("by", f"{of} is what is compared", "other columns")
     for metric in metrics:
@@ -47,11 +50,9 @@ def metrics_by_treatment(
         first = _first_row(missions.loc[twice, [of, *keys]])
         raise InputError("missions", f"{first} is there twice", "every mission once")
     spaces = [of, *(key for key in keys if key in (*by, "policy", "point", "seed"))]
-    values = {metric: intervals.values_within(missions, metric, spaces) for metric in metrics}
+    values = {metric: values_within(missions, metric, spaces) for metric in metrics}
     table = missions[[of, *keys]].assign(**values)
-    return {
-        name: part.set_index(keys)[[*values]] for (name,), part in intervals.group_rows(table, [of])
-    }
+    return {name: part.set_index(keys)[[*values]] for (name,), part in group_rows(table, [of])}
 
 
 def select_table(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.DataFrame:
@@ -89,7 +90,7 @@ def match_groups(
     names = tables[0].index.names
     unit = [name for name in names if name in (*by, "seed", "replication")]
     means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
-    for group, part in intervals.group_rows(means[0].reset_index(), by):
+    for group, part in group_rows(means[0].reset_index(), by):
         yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
 
 
@@ -175,13 +176,13 @@ def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.full_like(differences, first if abs(first) > rounding else 0.0)
 
 
-def t_test(differences: np.ndarray, level: float) -> tuple[intervals.Interval, float]:
+def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     """The mean difference with Student's interval, and the p-value of "no difference".
 
     If all differences are equal, the interval is degenerate and p is that of the sign test. The
     interval of a single difference is nan.
     """
-    mean = intervals.mean_interval(differences, level)
+    mean = mean_interval(differences, level)
     if np.ptp(differences) == 0:
         return mean, sign_test(differences)
     t = abs(mean.mean) / scipy.stats.sem(differences)
@@ -190,7 +191,7 @@ def t_test(differences: np.ndarray, level: float) -> tuple[intervals.Interval, f
 
 def difference_test(
     a: np.ndarray, b: np.ndarray, metric: str | Metric, level: float
-) -> tuple[intervals.Interval, float]:
+) -> tuple[Interval, float]:
     """The mean difference A - B of pairs, the interval that suits the metric, and its p-value.
 
     Args:
@@ -202,7 +203,7 @@ def difference_test(
     differences = differences_of(a, b)
     measure = metric_of(metric)
     level = measure.level_of_each(level)
-    rare = intervals.rare_differences(measure, a.mean(), b.mean())
+    rare = rare_differences(measure, a.mean(), b.mean())
     if rare is None or (differences.size == 1 and not measure.is_bounded):
         return t_test(differences, level)
     smooth, p = t_test(add_rare_pairs(differences, rare), level)
@@ -211,7 +212,33 @@ def difference_test(
     limit = measure.range[1] - measure.range[0]
     mean = float(differences.mean())
     p = min(p * measure.among, 1.0)
-    return intervals.Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
+    return Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
+
+
+def rare_differences(metric: Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
+    """The differences A - B of missions in which only one of two policies does well.
+
+    For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
+    the range, and the other one stays at its mean: what goes further counts. So a share falls to 0,
+    an age rises to what it is where no UAV flies, and a cost rises by the price of a lost fleet. A
+    reward changes by what a failure costs.
+
+    Args:
+        metric: The metric; that of missions (``metric_in_missions``) has the range of a time.
+        a: (...) means of A.
+        b: (...) means of B.
+
+    Returns:
+        The (...) highest and the (...) lowest differences; None if they are not known.
+    """
+    if metric.is_outcome:
+        return 0 * (a - b) + 1, 0 * (a - b) - 1
+    if metric.has_range:
+        least, most = metric.range
+        return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
+    if metric.failure:
+        return a - b + metric.failure, a - b - metric.failure
+    return None
 
 
 @cache
@@ -226,7 +253,7 @@ def column_tests(
     values: pd.DataFrame,
     baseline: pd.Series,
     metric: str | Metric = "",
-    levels: float | np.ndarray = intervals.LEVEL,
+    levels: float | np.ndarray = LEVEL,
 ) -> pd.DataFrame:
     """Paired comparisons of many columns with a baseline, as ``compare_pairs`` makes them.
 
@@ -237,52 +264,20 @@ def column_tests(
         levels: The confidence level, or (K,) levels.
 
     Returns:
-        (K, 7): ``difference`` (column - baseline) with ``low``, ``high``, ``n``, ``student`` (as in
-        ``Paired``), ``p`` and ``p_student``.
+        (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
     """
-    differences = values.sub(baseline, axis=0)
-    size = values.abs().max().clip(lower=baseline.abs().max())
-    constant = differences.max() - differences.min() <= _ROUNDING * size
-    differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
-    present = differences.notna()
-    n = differences.count()
-    mean = differences.mean()
-    measure = metric_of(metric)
-    levels = measure.level_of_each(levels)
-    half = -differences.sem() * stdtrit(np.maximum(n - 1, 1), (1 - levels) / 2)
-    ends = {"low": mean - half, "high": mean + half}
-    table = pd.DataFrame({"difference": mean, **ends, "n": n, "student": half})
-    means = values.where(present).mean()
-    rare = intervals.rare_differences(measure, means, means - mean)
-    t = (mean / differences.sem()).abs()
-    table["p"] = 2 * stdtr(np.maximum(n - 1, 1), -t)
-    for column in differences.columns[constant & (n > 0)]:
-        table.loc[column, "p"] = sign_test(differences[column].dropna().to_numpy())
-        if n[column] > 1:
-            table.loc[column, ["low", "high"]] = mean[column]
-    table["p_student"] = table["p"]
-    if rare is None:
-        return table
-    size = n + 2
-    centre = (n * mean + rare[0] + rare[1]) / size
-    squares = n * (differences.var(ddof=0) + (mean - centre) ** 2)
-    squares += (rare[0] - centre) ** 2 + (rare[1] - centre) ** 2
-    error = np.sqrt(squares / (size - 1) / size)
-    half = -stdtrit(size - 1, (1 - levels) / 2) * error
-    table["low"] = centre - half
-    table["high"] = centre + half
-    table["p"] = (2 * stdtr(size - 1, -(centre / error).abs()) * measure.among).clip(upper=1.0)
-    limit = measure.range[1] - measure.range[0]
-    table[["low", "high"]] = table[["low", "high"]].clip(-limit, limit)
-    if not measure.is_bounded:
-        table.loc[n == 1, ["low", "high", "p"]] = np.nan, np.nan, 1.0
-    if measure.is_outcome:
-        gains = (differences > 0).sum()
-        losses = (differences < 0).sum()
-        exact = (differences.isin((-1, 0, 1)) | ~present).all() & (n > 0)
-        table.loc[exact, "p"] = [*map(mcnemar_p_value, gains[exact], losses[exact])]
-        table.loc[exact, "p_student"] = table["p"]
-    return table
+    of_baseline = baseline.to_numpy(float)
+    rows = []
+    for column, level in zip(values, np.broadcast_to(levels, values.shape[1]), strict=True):
+        of_column = values[column].to_numpy(float)
+        measured = ~np.isnan(of_column) & ~np.isnan(of_baseline)
+        ends = Interval(np.nan, np.nan, np.nan)
+        p = np.nan
+        if measured.any():
+            pairs = of_column[measured], of_baseline[measured]
+            ends, p = difference_test(*pairs, metric, float(level))
+        rows.append((*ends, p, measured.sum()))
+    return pd.DataFrame(rows, values.columns, ["difference", "low", "high", "p", "n"])
 
 
 def sign_test(equal: np.ndarray) -> float:
@@ -320,7 +315,7 @@ class Paired(NamedTuple):
 
 
 def compare_pairs(
-    a: np.ndarray, b: np.ndarray, level: float = intervals.LEVEL, metric: str | Metric = ""
+    a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str | Metric = ""
 ) -> Paired:
     """Compare two samples pair by pair; differences are A - B.
 
@@ -368,7 +363,7 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     """
     more = [] if metric == REWARD else [0.0, 1.0]
     test = scipy.stats.ttest_ind([*a, *more], [*b, *more], equal_var=False)
-    ends = test.confidence_interval(intervals.LEVEL)
+    ends = test.confidence_interval(LEVEL)
     p = 1.0
     if not np.isnan(test.pvalue):
         p = float(test.pvalue)
@@ -377,9 +372,7 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
     return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
 
 
-def difference_of_intervals(
-    mean: intervals.Interval, other: intervals.Interval
-) -> intervals.Interval:
+def difference_of_intervals(mean: Interval, other: Interval) -> Interval:
     """How much higher a mean is than another one, from their two intervals.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998) 873-890, method 10.
@@ -387,12 +380,12 @@ def difference_of_intervals(
     difference = mean.mean - other.mean
     below = hypot(mean.mean - mean.low, other.high - other.mean)
     beyond = hypot(mean.high - mean.mean, other.mean - other.low)
-    return intervals.Interval(difference, difference - below, difference + beyond)
+    return Interval(difference, difference - below, difference + beyond)
 
 
 def relative_change(
     values: np.ndarray, reference: np.ndarray, metric: str | Metric = ""
-) -> intervals.Interval:
+) -> Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 
     Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
@@ -410,15 +403,15 @@ def relative_change(
     measure = metric_of(metric)
     ratio = float(mean / base)
     if n == 1:
-        return intervals.Interval(ratio - 1, np.nan, np.nan)
+        return Interval(ratio - 1, np.nan, np.nan)
     residuals = values - ratio * reference
     least, most = measure.range
     if measure.has_range:
         more = max(most - mean, mean - ratio * least)
         less = min(least - mean, mean - ratio * most)
         residuals = add_rare_pairs(residuals, (more, less))
-    _, low, high = (ratio - 1 + end for end in intervals.mean_interval(residuals / abs(base)))
-    return intervals.Interval(ratio - 1, max(low, -1.0) if least >= 0 else low, high)
+    _, low, high = (ratio - 1 + end for end in mean_interval(residuals / abs(base)))
+    return Interval(ratio - 1, max(low, -1.0) if least >= 0 else low, high)
 
 
 def compare(
@@ -426,7 +419,7 @@ def compare(
     baseline: str | int,
     metrics: Sequence[str] = (*metric_group("paper", "reward"),),
     by: Sequence[str] = (),
-    level: float = intervals.LEVEL,
+    level: float = LEVEL,
     correction: Correction | None = "holm",
     of: Treatment = "policy",
 ) -> pd.DataFrame:
@@ -451,14 +444,14 @@ def compare(
         group has several missions of a replication (at several
         design points, which share its random draws), their means are compared, and ``n`` is the
         number of replications. Where the number of UAVs is drawn, means and differences are
-        post-stratified by it (``stats.intervals.post_stratified``).
+        post-stratified by it (``stats.weights.post_stratified``).
 
     Raises:
         InputError: If a column is missing or does not contain numbers, the baseline is missing or
             the only one, a mission appears twice or only for one of a pair, or an argument is not
             allowed.
     """
-    intervals.check_share("level", level)
+    check_share("level", level)
     tables = metrics_by_treatment(missions, of, metrics, by)
     reference = select_table(tables, of, baseline)
     others = [name for name in tables if name != baseline]

@@ -9,7 +9,10 @@ import scipy
 
 from dess import InputError
 from dess.analysis.metrics import metric_in_missions
-from dess.analysis.stats import intervals
+from dess.analysis.stats.bootstrap import bootstrap_interval, expanded_level
+from dess.analysis.stats.intervals import Interval, interval_of
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_columns, check_share, group_rows
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -25,7 +28,7 @@ def distribution(
     quantiles: Sequence[float] = QUANTILES,
     tail: float = TAIL,
     worst: Worst | None = None,
-    level: float = intervals.LEVEL,
+    level: float = LEVEL,
     *,
     resamples: int = 9999,
 ) -> pd.DataFrame:
@@ -58,7 +61,7 @@ def distribution(
     Raises:
         InputError: If a column is missing, or an argument is not allowed.
     """
-    intervals.check_columns(missions, [metric, *by])
+    check_columns(missions, [metric, *by])
     measure = metric_in_missions(missions, metric)
     if worst is None and measure.less_is_better:
         worst = "highest"
@@ -67,25 +70,23 @@ def distribution(
     if worst not in get_args(Worst):
         raise InputError("worst", repr(worst), ", ".join(get_args(Worst)))
     for name, share in [*(("quantiles", q) for q in quantiles), ("tail", tail), ("level", level)]:
-        intervals.check_share(name, share)
+        check_share(name, share)
     sign = 1 if worst == "lowest" else -1
 
     def worst_mean(values: np.ndarray, axis: int = -1) -> Any:
         return sign * tail_mean(sign * values, tail, axis)
 
     rows = []
-    for group, part in intervals.group_rows(missions, by):
+    for group, part in group_rows(missions, by):
         values = part[metric].dropna().to_numpy(float)
         if not len(values):
             continue
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
-        expanded = intervals.expanded_level(level, tail * len(values))
-        risk = intervals.bootstrap_interval(
-            values, worst_mean, generator, expanded, resamples=resamples
-        )
+        expanded = expanded_level(level, tail * len(values))
+        risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
         if measure.has_range and risk.low == risk.high:
             tail_values = np.full(max(int(tail * len(values)), 1), risk.mean)
-            risk = intervals.interval_of(measure, tail_values, level)
+            risk = interval_of(measure, tail_values, level)
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(values)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]
@@ -93,8 +94,8 @@ def distribution(
 
 
 def quantile_interval(
-    values: Sequence[float] | np.ndarray, share: float, level: float = intervals.LEVEL
-) -> intervals.Interval:
+    values: Sequence[float] | np.ndarray, share: float, level: float = LEVEL
+) -> Interval:
     """A quantile with its distribution-free interval between two order statistics.
 
     Its coverage is at least its level for every distribution. If the sample is too small for an
@@ -108,7 +109,7 @@ def quantile_interval(
     sample = np.asarray(values, float)
     low, high = scipy.stats.quantile_test(sample, p=share).confidence_interval(level)
     ends = (-np.inf if np.isnan(low) else float(low), np.inf if np.isnan(high) else float(high))
-    return intervals.Interval(float(np.quantile(sample, share)), *ends)
+    return Interval(float(np.quantile(sample, share)), *ends)
 
 
 def tail_mean(values: np.ndarray, share: float = TAIL, axis: int = -1) -> Any:

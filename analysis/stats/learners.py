@@ -23,11 +23,13 @@ from dess.analysis.stats.differences import (
     differences_of,
     match_groups,
     metrics_by_treatment,
+    rare_differences,
     select_table,
     sign_test,
     t_test,
 )
-from dess.analysis.stats.intervals import LEVEL, check_share, rare_differences
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import check_share
 
 # What a comparison is about: all trainings of the learner, or the only one that there is.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"

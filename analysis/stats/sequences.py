@@ -7,11 +7,9 @@ wide as the interval of a mean for a fixed number, and 2.4 to 3.2 times as that 
 difference.
 
 Values with known bounds have the betting sequence of Waudby-Smith and Ramdas (Estimating means of
-bounded random variables by betting, JRSS B 86, 2024). It bets against every possible mean of a
-grid. The capital of a bet against the true mean seldom grows, so a mean against which the capital
-has grown to 1 / error is ruled out for ever. This is exact at any number of values. The stakes are
-those that the paper calls aGRAPA: nearly the ones with which the capital would have grown fastest
-so far.
+bounded random variables by betting, JRSS B 86, 2024). It bets against every possible mean of a grid
+(``betting``). This is exact at any number of values. The stakes are those that the paper calls
+aGRAPA: nearly the ones with which the capital would have grown fastest so far.
 
 Values without bounds have an asymptotic sequence (Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas,
 Time-uniform central limit theory and asymptotic confidence sequences, Annals of Statistics 52,
@@ -26,6 +24,7 @@ import math
 
 import numpy as np
 
+from dess.analysis.stats.betting import settle
 from dess.base.elementary import log
 from dess.base.kernels import kernel
 
@@ -137,10 +136,10 @@ def _bet(s, value):
         stake = distance / (variance + distance * distance)
         if stake > 0.0:
             stake = min(stake, _MOST_STAKED / tested)
-            s.for_more[part] *= 1.0 + stake * (value - tested)
+            s.for_more[part] = settle(s.for_more[part], stake, value, tested)
         else:
             stake = min(-stake, _MOST_STAKED / (1.0 - tested))
-            s.for_less[part] *= 1.0 - stake * (value - tested)
+            s.for_less[part] = settle(s.for_less[part], -stake, value, tested)
     s.sum += value
     deviation = value - s.sum / (s.values + 1)
     s.spread += deviation * deviation

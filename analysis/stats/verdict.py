@@ -26,7 +26,8 @@ from typing import Any
 import pandas as pd
 
 from dess.analysis.metrics import Metric, metric_of
-from dess.analysis.stats.intervals import LEVEL, Interval
+from dess.analysis.stats.intervals import Interval
+from dess.analysis.stats.kinds import LEVEL
 
 ABOVE, INCONCLUSIVE, BELOW = "above", "inconclusive", "below"
 SEEN_ABOVE, SEEN_BELOW = "above in what was seen", "below in what was seen"
@@ -140,6 +141,11 @@ def position_with_allowance(whole: str, without: str) -> str:
     if whole == INCONCLUSIVE:
         return sides.get(without, INCONCLUSIVE)
     return whole
+
+
+def judge_intervals(whole: Interval, seen: Interval) -> str:
+    """The verdict on a difference by its interval with the allowance for failures and without."""
+    return position_with_allowance(position_of(whole), position_of(seen))
 
 
 def judge_difference(row: Any) -> str:

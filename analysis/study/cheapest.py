@@ -1,4 +1,4 @@
-"""The cheapest fleet that meets its requirements: its tests, and the search for it."""
+"""The cheapest fleet that meets its requirements: the search for it."""
 
 import json
 from collections import defaultdict
@@ -22,7 +22,8 @@ from dess.analysis.metrics import (
     size_of,
 )
 from dess.analysis.names import DECISIONS
-from dess.analysis.stats.verdict import Verdict, judge_facts
+from dess.analysis.stats.betting import MeanTest, WorstNodeTest
+from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
 from dess.analysis.study.stopping import MOST_MISSIONS, Line, Samples, StrictTable, of_its_kind
@@ -31,115 +32,6 @@ from dess.physics.section import Integer, Number
 from dess.scenario.fields import is_number
 from dess.scenario.quantities import quantity_of
 from dess.scenario.scenario import ScenarioSpace
-
-# The largest stake, as a share of the stake with which a single value could lose everything.
-_BOLDEST = 0.999
-
-
-class MeanTest:
-    """A sequential test of whether a mean meets a requirement; the first verdict is final.
-
-    Attributes:
-        required: The least mean.
-        verdict: ``met``, ``missed``, or ``open``.
-        missions: Number of values observed up to the verdict; all values if it is ``open``.
-    """
-
-    def __init__(
-        self, required: float, tolerance: float, error: float, error_of_miss: float | None = None
-    ):
-        """Begin a test.
-
-        Args:
-            required: The least mean.
-            tolerance: How far from it either verdict is right.
-            error: The largest probability of each wrong verdict.
-            error_of_miss: That of the verdict ``missed``, if it has another one.
-        """
-        self.required = required
-        least = required - tolerance
-        most = required + tolerance
-        self._at_most = _Wealth(least, tolerance)
-        self._at_least = _Wealth(1 - most, tolerance)
-        self._target_of_met = -np.log(error)
-        self._target_of_missed = -np.log(error_of_miss or error)
-        self.verdict = Verdict.OPEN
-        self.missions = 0
-        self._total = 0.0
-
-    def observe(self, values: np.ndarray) -> None:
-        """Take more values into account, in the order of their replications."""
-        if self.verdict != Verdict.OPEN or not len(values):
-            return
-        met = _first_true(self._at_most.after(values) >= self._target_of_met)
-        missed = _first_true(self._at_least.after(1 - values) >= self._target_of_missed)
-        first = min(met, missed)
-        seen = values[: first + 1]
-        self._total += float(seen.sum())
-        self.missions += len(seen)
-        if first < len(values):
-            margin = self._total / self.missions - self.required
-            self.verdict = judge_facts(met == first, missed == first, margin)
-
-
-class WorstNodeTest:
-    """A sequential test of whether the means of all nodes meet a requirement.
-
-    It is met once each node has been found to meet it. That is wrong only if it is wrong of the
-    worst node, so the test of every node has the whole error (an intersection-union test: R. L.
-    Berger, Technometrics 24 (1982) 295-300). It is missed once a node has been found to miss it,
-    for which the nodes share the error.
-
-    Attributes:
-        required, verdict, missions: As of a ``MeanTest``.
-    """
-
-    def __init__(self, required: float, tolerance: float, error: float):
-        self.required = required
-        self.verdict = Verdict.OPEN
-        self.missions = 0
-        self._limits = tolerance, error
-        self._tests: list[MeanTest] = []
-
-    def observe(self, values: np.ndarray) -> None:
-        """Take more (n, K) values of K nodes into account, in the order of their replications."""
-        if self.verdict != Verdict.OPEN or not len(values):
-            return
-        nodes = values.shape[1]
-        tolerance, error = self._limits
-        self._tests = self._tests or [
-            MeanTest(self.required, tolerance, error, error / nodes) for _ in range(nodes)
-        ]
-        for test, of_node in zip(self._tests, values.T, strict=True):
-            test.observe(of_node)
-        self.missions += len(values)
-        self.verdict = Verdict.of_all(test.verdict for test in self._tests)
-
-
-class _Wealth:
-    """The wealth of a gambler who bets that a mean is above a bound."""
-
-    def __init__(self, bound: float, tolerance: float):
-        # The best stake is about (mean - bound) / variance, which is 4 * tolerance or more.
-        steps = max(int(np.ceil(np.log2(1 / (4 * tolerance * bound)))), 0)
-        self._bound = bound
-        self._stakes = _BOLDEST / bound * 0.5 ** np.arange(steps + 1)
-        self._logs = np.full(steps + 1, -np.log(steps + 1))
-
-    def after(self, values: np.ndarray) -> np.ndarray:
-        """The (n,) logarithms of the wealth after each of n more values; the first wealth is 1."""
-        growth = np.log1p(self._stakes[:, None] * (values - self._bound))
-        paths = np.cumsum(np.column_stack([self._logs, growth]), axis=1)[:, 1:]
-        self._logs = paths[:, -1]
-        return np.logaddexp.reduce(paths, axis=0)
-
-
-def _first_true(holds: np.ndarray) -> int:
-    """The index of the first true value, or the number of values if none is true."""
-    if holds.any():
-        return int(np.argmax(holds))
-    return len(holds)
-
 
 # A function that bounds costs. It takes the (s, g) design points of s candidates, and the number of
 # one of them. It returns (s,) an upper bound of how much more this one costs than each candidate (0

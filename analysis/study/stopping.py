@@ -16,13 +16,8 @@ from pydantic import (
 
 from dess import InputError
 from dess.analysis.metrics import NODES_BEHIND, Metric, metric_group, metric_in_missions, metric_of
-from dess.analysis.stats.intervals import (
-    LEVEL,
-    ends_of_means,
-    share_half_width,
-    skewness_of,
-    worst_and_spread,
-)
+from dess.analysis.stats.kinds import LEVEL, Sample, ends_of_means, skewness_of
+from dess.analysis.stats.worst_node import worst_and_spread
 from dess.base.errors import listed, shown, to_input_error, unknown_name
 from dess.physics.section import Integer, Number, plain
 
@@ -143,7 +138,7 @@ class Precision(StrictTable):
     """The rule that missions are added to a cell until its 95 % intervals are narrow enough.
 
     The half-widths are half the lengths of the intervals of ``stats.intervals.interval_of``:
-    Wilson's interval for ``success``, and those of ``stats.intervals.ends_of_means`` for the
+    Wilson's interval for ``success``, and those of ``stats.kinds.ends_of_means`` for the
     others; that of the worst node holds whichever node it is (``worst_of_nodes``). They are not
     post-stratified by the number of UAVs, so where it is drawn, the printed intervals are narrower.
     The *stopping point* is the first n >= ``first`` at which all targets
@@ -306,13 +301,8 @@ def running_interval(metric: str | Metric, values: np.ndarray) -> tuple[np.ndarr
         means, widths = running_interval(measure, sample[present])
         place = np.cumsum(present)
         return np.append(0.0, means)[place], np.append(np.inf, widths)[place]
-    counts = np.arange(1, len(sample) + 1)
-    if measure.is_outcome:
-        successes = np.cumsum(sample)
-        return successes / counts, share_half_width(successes, counts)
-    means, variances, skewness = _running_moments(sample)
-    ends = ends_of_means(measure, means, variances, skewness, counts)
-    return means, _half_widths(measure, ends)
+    running = _running_sample(sample, measure.is_outcome)
+    return running.mean, _half_widths(ends_of_means(measure, running))
 
 
 def running_interval_of_worst(metric: Metric, by_node: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -328,39 +318,38 @@ def running_interval_of_worst(metric: Metric, by_node: np.ndarray) -> tuple[np.n
     Returns:
         (n,) means and (n,) half-widths.
     """
-    counts = np.arange(1, len(by_node) + 1)
-    level = metric.level_of_each(LEVEL)
-    of_nodes = [_running_moments(values) for values in by_node.T]
-    means, variances, skewness = (
-        np.stack(moment, axis=-1) for moment in zip(*of_nodes, strict=True)
+    rows = np.arange(len(by_node))
+    of_nodes = [_running_sample(values) for values in by_node.T]
+    means, variances, skewness, counts = (
+        np.stack([getattr(running, name) for running in of_nodes], axis=-1)
+        for name in ("mean", "variance", "skewness", "n")
     )
-    ends = ends_of_means(metric, means, variances, skewness, counts[:, None], level)
+    level = metric.level_of_each(LEVEL)
+    ends = ends_of_means(metric, Sample(means, variances, skewness, counts), level)
     worst, farthest, scale = worst_and_spread(means, np.stack(ends, axis=-1), metric)
-    rows = counts - 1
-    means_of_worst = means[rows, worst]
     spread = variances[rows, farthest] * scale**2
     skew = np.where(spread > 0, skewness[rows, farthest], 0.0)
-    ends = ends_of_means(metric, means_of_worst, spread, skew, counts, level)
-    return means_of_worst, _half_widths(metric, ends)
+    of_worst = Sample(means[rows, worst], spread, skew, rows + 1)
+    return of_worst.mean, _half_widths(ends_of_means(metric, of_worst, level))
 
 
-def _running_moments(sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Means, mean squared deviations and skewness of the first 1..n values."""
-    counts = np.arange(1, len(sample) + 1)
-    # The values are shifted by the first one, so that equal values give a width of exactly 0.
-    shifted = sample - sample[:1]
+def _running_sample(values: np.ndarray, is_of_outcomes: bool = False) -> Sample:
+    """The samples of the first 1..n values."""
+    counts = np.arange(1, len(values) + 1)
+    origin = values[:1]  # so that equal values give a width of exactly 0
+    if is_of_outcomes:  # whose sums are exact
+        origin = np.zeros(1)
+    shifted = values - origin
     means = np.cumsum(shifted) / counts
-    before = np.concatenate([[0.0], means[:-1]])[: len(sample)]
+    before = np.concatenate([[0.0], means[:-1]])[: len(values)]
     squares = np.cumsum((counts - 1) / counts * (shifted - before) ** 2)  # Welford
     sums = np.cumsum(shifted**3) - 3 * means * np.cumsum(shifted**2)
     skewness = skewness_of(squares, sums + 2 * counts * means**3, counts)
-    return sample[:1] + means, squares / counts, skewness
+    return Sample(origin + means, squares / counts, skewness, counts, is_of_outcomes)
 
 
-def _half_widths(metric: Metric, ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Half the lengths of intervals of the first 1..n values; a single one may have none."""
+def _half_widths(ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Half the lengths of intervals; infinite where a single value has none."""
     low, high = ends
     widths = (high - low) / 2
-    if not metric.is_bounded:
-        widths[:1] = np.inf
-    return widths
+    return np.where(np.isnan(widths), np.inf, widths)

@@ -34,6 +34,7 @@ from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Selection
 from dess.analysis.study.stopping import MOST_MISSIONS, Precision, StrictTable, Text
+from dess.base.commands import command_line
 from dess.base.descriptions import Description
 from dess.base.errors import cut, listed, to_input_error, unknown_name
 from dess.base.files.reading import Shipped
@@ -312,15 +313,11 @@ class Study(StudyData):
                     f"{fleet} at most",
                 )
 
-    @property
-    def command(self) -> list[str]:
-        """The command that runs the study, if it was read by ``load_study``."""
+    def command(self, out: Path) -> str:
+        """The command that runs the study in a folder, if it was read by ``load_study``."""
         name, changes = self._origin
-        policies = [word for team in changes.get("policies", ()) for word in ("--policy", team)]
-        missions = []
-        if "missions" in changes:
-            missions = ["--missions", str(changes["missions"])]
-        return ["dess", "study", "run", name or self.name, *policies, *missions]
+        given = {"policy": changes.get("policies"), "missions": changes.get("missions")}
+        return command_line("study", "run", name or self.name, **given, out=out)
 
     @cached_property
     def _base(self) -> ScenarioSpace:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.analysis.metrics import metric_for_length, metric_of, size_of
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.sequences import SEQUENCE
 from dess.analysis.study.prices import Costs, full_packs_of, has_priced_types
 from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS

@@ -25,6 +25,7 @@ from pydantic import (
     model_validator,
 )
 
+from dess.base.commands import command_line
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown, validated
 from dess.base.files.documents import Document, Sha256
@@ -364,17 +365,19 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
         original = load_config(name)
     except InputError:  # only its path is unknown
         original = config
-    words = ["dess", "train", name, "--out", str(out)]
+    changed: dict[str, Any] = {}
     if config.seed != original.seed:
-        words += ["--seed", str(config.seed)]
+        changed["seed"] = config.seed
     if config.scenario != original.scenario:
-        words += ["--scenario", config.scenario]
-    for key, value in config.set.items():
-        if original.set.get(key) != value:
-            words += ["--set", f"{key}={toml_value(value)}"]
+        changed["scenario"] = config.scenario
+    changed["set"] = {
+        key: toml_value(value)
+        for key, value in config.set.items()
+        if original.set.get(key) != value
+    }
     if device != "auto":
-        words += ["--device", device]
-    return shlex.join([*words, "--resume"])
+        changed["device"] = device
+    return command_line("train", name, out=out, **changed, resume=True)
 
 
 FORMAT: Literal[1] = 1

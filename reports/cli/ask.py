@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
@@ -180,6 +180,8 @@ def _answer_question(
     from dess.analysis.ask.answer import Answer
     from dess.analysis.ask.limits import find_limits
 
+    if dry_run:  # an answer tells them
+        options.print_notes(question.notes)
     answer = Answer(question, _run_question(question, page, out, workers, dry_run, yes))
     if changes := answer.question_around():
         _run_question(changes, page, out, workers, dry_run, yes)
@@ -197,11 +199,10 @@ def _run_question(
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
-    options.note_limits(study.scenarios)
     results = run_or_exit(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
-        shlex.join(["dess", "study", "run", str(question.file), "--out", str(folder)]),
+        command_line("study", "run", question.file, out=folder),
     )
     options.note_departures(study.policies, study.scenarios)
     return results

@@ -2,13 +2,13 @@
 
 import json
 import re
-import shlex
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dess.base.commands import command_line
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
 
@@ -110,7 +110,7 @@ def evaluate(
         _print_rows(rows)
         _print_differences(differences)
         if out:
-            console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+            console.print_text(f"more: {command_line('study', 'show', out)}")
 
 
 def _evaluate_as_study(

@@ -4,7 +4,6 @@ import ast
 import json
 import math
 import re
-import shlex
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import parse_toml
 from dess.reports.cli.console import print_text
@@ -133,11 +133,9 @@ def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") 
         print_text(f"note: {line}", sys.stderr)
 
 
-def note_limits(spaces: "Iterable[ScenarioSpace]") -> None:
-    """Say on stderr which nodes no UAV can serve, and which zones have no room for all UAVs."""
-    from dess.analysis.sheet import scenario_notes
-
-    for line in scenario_notes(spaces):
+def print_notes(notes: Iterable[str]) -> None:
+    """Print notes on stderr, such as which nodes no UAV can serve."""
+    for line in notes:
         print_text(f"note: {line}", sys.stderr)
 
 
@@ -182,7 +180,7 @@ def parse_setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[s
         if equals and parsed.keys() == {"value"} and _is_plain(parsed["value"]):
             return key, parsed["value"]
     if allowed == FIELD and (_RANGE.fullmatch(value) or "," in value.partition("[")[0]):
-        many = shlex.join(["dess", "sweep", SET, text])
+        many = command_line("sweep", set=[text])
         raise InputError(option, f"{shown(text)} has several values", f"one, or {many}")
     if allowed == FIELD and value:
         _check_word(key, value, option)

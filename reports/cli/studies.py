@@ -1,7 +1,6 @@
 """``dess study``: run a study into a results folder; show, compare and bundle results."""
 
 import json
-import shlex
 import sys
 from collections.abc import Iterable
 from datetime import date
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.errors import InputError, unknown_name
 from dess.base.libraries import needs
 from dess.reports.cli import console, options
@@ -118,7 +118,7 @@ def _run_and_summarize(
         ),
     )
     print_summary(results, out, short=True)
-    console.print_text(f"more: {shlex.join(['dess', 'study', 'show', str(out)])}")
+    console.print_text(f"more: {command_line('study', 'show', out)}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from dess.base.commands import command_line
 from dess.base.errors import InputError, shown
 from dess.base.libraries import missing, needs
 from dess.reports.cli import console, options
@@ -109,7 +110,7 @@ def train(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
     )
-    evaluated = shlex.join(["dess", "evaluate", "--policy", str(out), "--policy", "greedy"])
+    evaluated = command_line("evaluate", policy=[out, "greedy"])
     console.print_text(f"compare: {evaluated}")
 
 

@@ -38,7 +38,7 @@ from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
 from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
 from dess.analysis.ask import around
-from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.assumptions import assumption_sentences, limit_sentences
 from dess.analysis.ask.brief import brief_sentences
 from dess.analysis.ask.falls import draw_falls
 from dess.analysis.ask.limits import find_limits
@@ -83,7 +83,8 @@ shown = found.scenario(point)
 study.make_panel_of(found)
 
 # %%
-render_part("assumptions.html", lines=assumption_sentences(found)) if sea.units else None
+assumed = [*assumption_sentences(found), *limit_sentences(found)] if sea.units else []
+render_part("assumptions.html", lines=assumed) if assumed else None
 
 # %% [markdown]
 # ## Why

@@ -22,8 +22,10 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 from pathlib import Path
 
 from dess.analysis import load_results, metrics, names, numbers
-from dess.analysis.answers import main_effects, summary
-from dess.analysis.answers.main_effects import plot_effect, plot_one_by_one
+from dess.analysis.answers import summary
+from dess.analysis.answers.settings import shapes
+from dess.analysis.answers.settings.effects import means_by_field
+from dess.analysis.answers.settings.figures import plot_effect, plot_one_by_one
 from dess.analysis.answers.settings.sobol import (
     index_table,
     plot_indices,
@@ -32,7 +34,7 @@ from dess.analysis.answers.settings.sobol import (
 )
 from dess.analysis.answers.summary import plot_performance
 from dess.analysis.paper import scorecard, values
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.reports.pages.markdown import write_markdown
 from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
 from dess.reports.pages.provenance import provenance_table
@@ -41,21 +43,21 @@ from dess.reports.pages.tables import make_table
 # %%
 folder = Path(results)
 fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
-policies = main_effects.leading_policies(fig5, learned, heuristic)
+policies = summary.leading_policies(fig5, learned, heuristic)
 leading = policies[0]
-effects = main_effects.means_by_field(fig5)
+effects = means_by_field(fig5)
 effects = effects[effects["policy"].isin(policies)]
-changes = main_effects.compare_values_by_field(fig5, effects)
-ratios = main_effects.compare_values_by_field(fig5, effects, metrics.RATIO)
+changes = shapes.compare_values_by_field(fig5, effects)
+ratios = shapes.compare_values_by_field(fig5, effects, metrics.RATIO)
 level = numbers.format_level(LEVEL)
 checks = summary.means_of_check(sweet)
 paper = values.printed_intervals(sweet, "sweet-spot")
 
 # %%
-make_answer(main_effects.strongest_fields_sentence(effects, policies, changes))
+make_answer(shapes.strongest_fields_sentence(effects, policies, changes))
 
 # %%
-most = effects[effects["field"].isin(main_effects.strongest_fields(effects, leading))]
+most = effects[effects["field"].isin(shapes.strongest_fields(effects, leading))]
 lead_figure(
     plot_one_by_one(effects, fig5.policies),
     "The product against every parameter",
@@ -145,7 +147,7 @@ make_gallery(
 
 # %%
 make_table(
-    main_effects.main_effects_table(effects, changes, ratios),
+    shapes.shape_table(effects, changes, ratios),
     f"Product; differences in points with {level} intervals, also of the collection ratio",
     effects,
 )

@@ -30,7 +30,6 @@ from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table, prices_in_words
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
-from dess.analysis.answers.main_effects import draw_one_at_a_time
 from dess.analysis.answers.main_figure import draw_main_figure
 from dess.analysis.answers.settings.baseline import baseline_in_words, baseline_table
 from dess.analysis.answers.settings.effects import effect_table
@@ -38,6 +37,7 @@ from dess.analysis.answers.settings.figures import (
     draw_curves,
     draw_heat_maps,
     draw_main_effects,
+    draw_one_at_a_time,
     draw_scatter,
     draw_small_multiples,
     plot_distribution,
@@ -101,9 +101,9 @@ show_parts(
 page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
-from dess.analysis.ask.assumptions import assumption_sentences
+from dess.analysis.ask.assumptions import assumption_sentences, limit_sentences
 
-render_part("assumptions.html", lines=assumption_sentences(study, by))
+render_part("assumptions.html", lines=[*assumption_sentences(study, by), *limit_sentences(study)])
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why

@@ -27,13 +27,12 @@ from dess.analysis.metrics import (
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
-    bounded_ends,
     column_intervals,
-    level_after,
     mean_interval,
     share_interval,
     stratified_interval,
 )
+from dess.analysis.stats.kinds import Sample, ends_of_means, level_after
 from dess.analysis.stats.learners import compare_crossed
 from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
 from dess.analysis.study.cheapest import Cheapest, Setting
@@ -86,7 +85,8 @@ PRODUCTS: dict[str, Drawing] = {
 
 
 def bounded(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return bounded_ends(values.mean(axis=1), values.var(axis=1), values.shape[1])
+    sample = Sample(values.mean(axis=1), values.var(axis=1), 0.0, values.shape[1])
+    return ends_of_means(metric_of(PRODUCT), sample)
 
 
 def student(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,8 +7,8 @@ import pytest
 
 from dess import ScenarioSpace, analysis, load_scenario
 from dess.analysis.sheet import scenario_notes, unreachable_sentences
-from dess.reports.cli import main
-from dess.reports.cli.options import note_limits
+from dess.reports.cli import ask, main
+from dess.reports.cli.options import print_notes
 from tests.dess.model.test_reach import SHEET
 
 NODES = {"nodes": [[3, 0], [55, 0], [60, 0]], "names": ["near", "between", "far"]}
@@ -32,7 +32,7 @@ def test_of_several_fleets_the_one_that_reaches_least_is_told(capsys):
         "beyond the margins that the return guard keeps for 2 UAVs: between",
         "without these nodes a collection ratio of 33.3 % is the highest",
     ]
-    note_limits(_spaces(1, 2))
+    print_notes(scenario_notes(_spaces(1, 2)))
     assert capsys.readouterr().err == "".join(f"note: {line}\n" for line in sentences)
     assert unreachable_sentences([ScenarioSpace.of()]) == []
 
@@ -49,6 +49,21 @@ def test_an_answer_tells_it_too(tmp_path):
     ]
 
 
+@pytest.mark.parametrize(
+    "more", [(), ("--dry-run",), ("--price", "uav=1", "--require", "ratio=0.01")]
+)
+def test_a_command_tells_it_once(more, tmp_path, capsys, monkeypatch):
+    """It was told twice on stderr, in the answer, and among what is assumed."""
+    [space] = _spaces(1)
+    (tmp_path / "sea.toml").write_text(space.to_toml())
+    monkeypatch.setattr(ask, "missing", lambda *_: "not here")  # no page is made
+    command = ["sweep", "--scenario", str(tmp_path / "sea.toml"), "--set", "uavs=1,2"]
+    command += ["--policy", "greedy", "--missions", "2", "--results", str(tmp_path / "results")]
+    assert main([*command, *more]) == 0
+    told = "".join(capsys.readouterr())
+    assert told.count("a collection ratio of 33.3 % is the highest") == 1
+
+
 def _crowded(**fields: Any) -> ScenarioSpace:
     """A further zone of one cell, and pads in both zones that are enough for 4 UAVs in number."""
     zones = [{"cells": [9, 9, 1, 1], "pads": 1}]
@@ -61,7 +76,7 @@ def test_a_zone_without_room_for_all_uavs_is_told(tmp_path, capsys):
         "give more cells or pads, or landing = true"
     )
     assert scenario_notes([_crowded(uavs=3), _crowded()]) == [told]
-    note_limits([_crowded()])
+    print_notes(scenario_notes([_crowded()]))
     assert capsys.readouterr().err == f"note: {told}\n"
     (tmp_path / "sea.toml").write_text(_crowded().to_toml())
     assert main(["scenarios", "show", str(tmp_path / "sea.toml")]) == 0

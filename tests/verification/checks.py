@@ -15,7 +15,7 @@ from scipy import stats
 
 from dess.analysis import numbers
 from dess.analysis.stats.differences import adjust_p_values
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import integrate, stats
 
-from dess.analysis.stats.intervals import LEVEL, share_interval
+from dess.analysis.stats.intervals import share_interval
+from dess.analysis.stats.kinds import LEVEL
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace

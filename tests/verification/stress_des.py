@@ -21,7 +21,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dess.analysis import numbers
 from dess.analysis.numbers import format_level
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.model.events import EVENT_NAMES
 from dess.scenario.fields import SAMPLED, fields_of
 from dess.scenario.scenario import Scenario, ScenarioSpace

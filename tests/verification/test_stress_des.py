@@ -7,7 +7,7 @@ import pytest
 
 from dess.analysis import load_study, study_names
 from dess.analysis.results.manifest import Manifest
-from dess.analysis.stats.intervals import LEVEL
+from dess.analysis.stats.kinds import LEVEL
 from dess.scenario.fields import GEOMETRY, LANDING, SECTIONS
 from dess.scenario.scenario import Scenario
 from tests.pins.pinned import check_kept

@@ -22,8 +22,10 @@ from dess.analysis.names import PARAMETERS, field_named
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare
-from dess.analysis.stats.intervals import LEVEL, by_replication, share_interval
+from dess.analysis.stats.intervals import share_interval
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import BETTER, INCONCLUSIVE, SEEN_BETTER, SEEN_WORSE, WORSE
+from dess.analysis.stats.weights import by_replication
 from dess.base.errors import unknown_name
 
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics

@@ -13,7 +13,6 @@ from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import PARAMETERS, field_named, value_text
 from dess.analysis.stats.differences import add_adjusted, compare_pairs, for_choice
-from dess.analysis.stats.intervals import values_within
 from dess.analysis.stats.verdict import (
     BETTER,
     INCONCLUSIVE,
@@ -24,6 +23,7 @@ from dess.analysis.stats.verdict import (
     better_or_worse,
     judge_by_tests,
 )
+from dess.analysis.stats.weights import values_within
 
 BINS = 5  # largest number of bins of a parameter
 LEAST = 10  # missions of a bin that is shown

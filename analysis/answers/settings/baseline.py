@@ -21,7 +21,8 @@ from dess.analysis.metrics import (
 )
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, column_tests
-from dess.analysis.stats.intervals import by_replication, level_after
+from dess.analysis.stats.kinds import level_after
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import (
     INTERVALS,
     MOST_ROWS,

@@ -1,6 +1,7 @@
 """Means of a metric at the values of some fields, averaged over all other varied fields.
 
 average_over_others(results, ["uavs"])  # by number of UAVs
+main_effects(results)  # by each field
 """
 
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
+from dess import InputError
 from dess.analysis.answers.settings.points import (
     ordered_values,
     points_left,
@@ -22,17 +24,14 @@ from dess.analysis.metrics import (
     metric_in_groups,
     metric_in_missions,
     metric_of,
+    metrics_in,
 )
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
-from dess.analysis.stats.intervals import (
-    Interval,
-    by_replication,
-    column_intervals,
-    level_after,
-    stratified_interval,
-)
+from dess.analysis.stats.intervals import Interval, column_intervals, stratified_interval
+from dess.analysis.stats.kinds import level_after
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -80,15 +79,16 @@ def main_effects(
     """The partial dependence of a metric on every varied field, see ``average_over_others``.
 
     A field with more than ``MOST_VALUES`` numbers, as in a sampled design, is divided into bins
-    with about equally many design points.
+    with about equally many design points. Of a design that varies one field at a time, a field has
+    the values of the points that set it, without bins.
 
     Returns:
         A row per field, policy and value: ``field``, ``value`` in words, ``position`` (0, 1, ... in
         the order of the values) and the columns of ``average_over_others`` but the fields.
     """
     tables = []
-    for field, values in values_of_points(results).items():
-        binned = _bin_values(values)
+    for field in values_of_points(results):
+        binned = labels_of_field(results, str(field))
         means = _average_labelled(results, binned.to_frame("value"), metric, policy)
         for _, rows in means.groupby("policy", sort=False):
             rows.insert(0, "field", field)
@@ -98,6 +98,36 @@ def main_effects(
     if tables:
         return pd.concat(tables, ignore_index=True)
     return pd.DataFrame()
+
+
+def labels_of_field(results: Results, field: str) -> pd.Series:
+    """The values of a field, or their bins, at the design points whose means tell its effect."""
+    values = values_of_points(results)[field]
+    if results.design == "one-at-a-time":
+        return values[[field in point.values for point in results.store.manifest.points]]
+    return _bin_values(values)
+
+
+def means_by_field(results: Results) -> pd.DataFrame:
+    """The ``main_effects`` on all metrics, of a design that varies one field at a time.
+
+    Returns:
+        A row per metric, field, policy and value: ``field``, ``value``, ``position``, ``policy``,
+        ``metric``, ``mean``, ``low``, ``high`` (95 %) and ``n``, as ``main_effects`` has them.
+
+    Raises:
+        InputError: If a design point sets more or less than one field.
+    """
+    for number, point in enumerate(results.store.manifest.points):
+        if len(point.values) != 1:
+            fields = ", ".join(point.values) or "no field"
+            raise InputError(f"point {number}", f"sets {fields}", "one field at a time")
+    tables = [
+        main_effects(results, metric).assign(metric=metric)
+        for metric in metrics_in(results.missions)
+    ]
+    columns = ["field", "value", "position", "policy", "metric", "mean", "low", "high", "n"]
+    return pd.concat(tables, ignore_index=True).reindex(columns=columns)
 
 
 def fields_by_influence(effects: pd.DataFrame) -> list[str]:
@@ -114,11 +144,13 @@ def fields_by_influence(effects: pd.DataFrame) -> list[str]:
 def _average_labelled(
     results: Results, labels: pd.DataFrame, metric: str, policy: str | None
 ) -> pd.DataFrame:
-    """``average_over_others`` at each combination of labels of design points."""
-    groups = labels.groupby([*labels], sort=False)
-    cell_of = groups.ngroup().to_numpy()
+    """``average_over_others`` at each combination of labels of some design points."""
+    points = labels.index.to_numpy()
+    cell_of_points = labels.groupby([*labels], sort=False).ngroup().to_numpy()
+    cell_of = np.full(len(results.store.manifest.points), -1)
+    cell_of[points] = cell_of_points
     cells = labels.drop_duplicates(ignore_index=True)
-    sizes = np.bincount(cell_of)
+    sizes = np.bincount(cell_of_points)
     check_metric(metric, results.missions)
     missions = results.missions_of(policy)
     measure = metric_in_missions(results.missions, metric)
@@ -127,6 +159,7 @@ def _average_labelled(
         last = len(design["ranges"]) + 2
         missions = missions[(missions["point"] % (last + 1)).isin((0, last))]
     missions = missions.assign(cell=cell_of[missions["point"].to_numpy()])
+    missions = missions[missions["cell"] >= 0]
     tables = []
     for name, part in missions.groupby("policy", sort=False):
         looks = results.looks(str(name))
@@ -144,7 +177,7 @@ def _average_labelled(
             ends = _intervals_over_points(at_points, cell_of, of_cells, level_after(seen))
         left = np.ones(len(cells), bool)
         if (sizes == 1).all():  # a cell is a design point
-            left[cell_of] = points_left(results, str(name))
+            left[cell_of_points] = points_left(results, str(name))[points]
         verdicts = judge_alternatives(
             wide.to_numpy(float), ends["low"], ends["high"], measure, seen, left
         )

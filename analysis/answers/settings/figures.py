@@ -3,7 +3,7 @@
 A figure of ``results`` comes with its caption, its alternative text and its data (``Drawing``).
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import ceil
 from textwrap import fill
@@ -20,15 +20,17 @@ from dess.analysis.answers.settings.effects import (
     average_over_others,
     fields_by_influence,
     main_effects,
+    means_by_field,
 )
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import rank_settings
+from dess.analysis.answers.settings.shapes import compare_values_by_field
 from dess.analysis.figures import Drawing, name_best_mean, style
-from dess.analysis.metrics import PRODUCT, Metric, metric_of
+from dess.analysis.metrics import METRICS, PRODUCT, Metric, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import NOT_RULED_OUT, SEEN_WORSE, WORSE
-from dess.analysis.tables import INTERVALS
+from dess.analysis.tables import BARS, INTERVALS
 
 MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
 
@@ -384,3 +386,73 @@ def _left_out_in_words(values: Sequence[Any], panels: Sequence[Any]) -> str:
         return ""
     drawn = ", ".join(map(value_text, panels))
     return f" ({len(panels)} of {len(values)} values: {drawn}; the others are in the data)"
+
+
+def plot_effect(
+    table: pd.DataFrame, field: str, changes: Mapping[str, pd.DataFrame], policies: list[str]
+) -> Figure:
+    """The metrics against a parameter: a part of Fig. 5.
+
+    There is a panel per metric, with the same axis for every parameter of the table, and a panel
+    with the differences from the first value, which has its own axis.
+
+    Args:
+        table: Rows of ``effects.means_by_field``, of the policies to draw.
+        field: The parameter.
+        changes: For each policy to draw, its ``shapes.compare_values`` in the last of ``METRICS``.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
+    """
+    rows = table[table["field"] == field]
+    styles = style.policy_colours(policies, changes)
+    first = rows[rows["position"] == 0]
+    steps = pd.concat(
+        [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
+    ).rename(columns={"difference": "mean", "second": "position"})
+    steps = pd.concat([first.assign(mean=0.0, low=0.0, high=0.0).drop_duplicates("policy"), steps])
+    steps["value"] = steps["position"].map(rows.set_index("position")["value"].to_dict())
+    ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
+    with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
+        for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
+            style.plot_along(rows[rows["metric"] == metric], styles, "%", ax)
+            ax.set(
+                ylabel=fill(name, 16), ylim=style.axis_ends(table[table["metric"] == metric], 0.1)
+            )
+        style.plot_along(steps, styles, "points", axes[-1])
+        axes[-1].axhline(0, **style.ZERO)
+        title = f"Paired difference from the value at {first['value'].iloc[0]}"
+        axes[-1].set(title=title, ylabel="percentage\npoints")
+        axes[-1].set_xlabel(field_named(field).label, parse_math=True)
+    return figure
+
+
+def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
+    """The paper's metrics against every field, with all other fields as in the scenario."""
+    table = means_by_field(results)
+    for field, pairs in compare_values_by_field(results, table).items():
+        data = table[table["field"] == field]
+        caption = (
+            f"n = {counted_missions(data)} missions per point; bars are {INTERVALS}. The lowest "
+            "panel shows the paired difference from the first value, with an axis of its own: "
+            f"{BARS}"
+        )
+        alt = f"The metrics against the {field_named(field).within}"
+        yield Drawing(plot_effect(table, field, pairs, results.policies), alt, caption, data)
+
+
+def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
+    """The product against every parameter, in panels side by side with the same axis.
+
+    Args:
+        table: Rows of ``effects.means_by_field``, of the policies to draw.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
+    """
+    rows = table[table["metric"] == PRODUCT]
+    fields = [*rows["field"].unique()]
+    styles = style.policy_colours(policies, rows["policy"])
+    with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
+        for ax, field in zip(axes, fields, strict=True):
+            style.plot_along(rows[rows["field"] == field], styles, "%", ax)
+            ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
+            ax.tick_params(axis="x", labelsize=8)
+        figure.supylabel(metric_of(PRODUCT).label, fontsize=10)
+    return figure

@@ -43,12 +43,8 @@ from dess.analysis.metrics import (
 from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
-from dess.analysis.stats.intervals import (
-    by_replication,
-    column_intervals,
-    level_after,
-    mean_interval,
-)
+from dess.analysis.stats.intervals import column_intervals, mean_interval
+from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.verdict import (
     MARKS,
     NOT_RULED_OUT,
@@ -56,6 +52,7 @@ from dess.analysis.stats.verdict import (
     SEEN_WORSE,
     WORSE,
 )
+from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import (
     MOST_PRINTED,
     MOST_ROWS,

@@ -13,9 +13,7 @@ from dess.analysis.figures import Drawing
 from dess.analysis.metrics import METRICS, PRODUCT, metric_group, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.intervals import (
-    LEVEL,
-)
+from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.study.design import NOISE, Saltelli
 from dess.analysis.tables import INTERVALS, Table, stack_by_policy
 

@@ -1,6 +1,5 @@
 """Folders of trained policies that come with the curves of their trainings."""
 
-import shlex
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from dess.analysis.answers.training.curves import (
     smooth_curves,
 )
 from dess.analysis.figures import Drawing
+from dess.base.commands import command_line
 from dess.base.files.reading import paths_in
 from dess.policies.learner.config import TrainingConfig, learner_identifier, read_description
 
@@ -98,11 +98,8 @@ def course_in_words(policy: Trained, margin: float) -> str:
 def training_commands(policies: Iterable[Trained]) -> list[str]:
     """The commands that train the policies again."""
     return [
-        shlex.join(
-            [
-                *("dess", "train", policy.config.name),
-                *("--seed", str(policy.config.seed), "--out", f"runs/{policy.name}"),
-            ]
+        command_line(
+            "train", policy.config.name, seed=policy.config.seed, out=f"runs/{policy.name}"
         )
         for policy in policies
     ]

@@ -6,7 +6,8 @@ from dess import InputError, load_scenario
 from dess.analysis.execution import effort, evaluation
 from dess.analysis.execution.evaluation import Asked, check_evaluation, estimate_means, evaluate
 from dess.analysis.metrics import metric_group
-from dess.analysis.stats.intervals import interval_of, post_stratified
+from dess.analysis.stats.intervals import interval_of
+from dess.analysis.stats.weights import post_stratified
 from dess.base.files import memory
 
 SPACE = load_scenario("paper", quota=30)

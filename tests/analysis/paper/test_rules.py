@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dess.analysis.answers.main_effects import LEVELS, PEAK, RISES, VALLEY, Shape
+from dess.analysis.answers.settings.shapes import LEVELS, PEAK, RISES, VALLEY, Shape
 from dess.analysis.answers.training.transfer import Transfer
 from dess.analysis.paper import rules, values
 from dess.analysis.paper.measures import Pairs, negate_changes
@@ -14,7 +14,7 @@ from dess.analysis.stats.differences import difference_of_intervals
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from dess.analysis.study.selection import Choice
-from tests.analysis.answers.test_main_effects import pairs_of
+from tests.analysis.answers.settings.test_shapes import pairs_of
 
 
 def around(mean: float, half: float = 0.01) -> Interval:

@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from dess import InputError
+from dess.analysis.stats.bootstrap import bootstrap_interval
 from dess.analysis.stats.distribution import distribution, quantile_interval, tail_mean
-from dess.analysis.stats.intervals import bootstrap_interval, bounded_interval
+from dess.analysis.stats.intervals import bounded_interval
 from tests.analysis.stats.test_intervals import MISSIONS
 
 

@@ -1,6 +1,4 @@
-"""Intervals of means and shares: by hand, over strata, and by the number of UAVs."""
-
-from dataclasses import replace
+"""Intervals of means and shares: by hand, of columns, over strata, and of groups."""
 
 import numpy as np
 import pandas as pd
@@ -9,12 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dess.analysis.execution.evaluation import Asked, estimate_means, evaluate
 from dess.analysis.metrics import (
-    LEAST,
     MOST_SLOTS,
-    NODE_AGES,
-    NODE_RATIOS,
     OLDEST,
     PRODUCT,
     RATIO,
@@ -22,26 +16,18 @@ from dess.analysis.metrics import (
     SUCCESS,
     metric_for_length,
     metric_in_missions,
-    metric_of,
 )
-from dess.analysis.stats.differences import compare
+from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (
     Moments,
-    bootstrap_interval,
     bounded_interval,
-    by_replication,
     column_intervals,
-    expanded_level,
     interval_of,
     mean_interval,
-    post_stratified,
     share_interval,
-    skewness_of,
     stratified_interval,
-    summary,
-    worst_of_nodes,
 )
-from dess.scenario.scenario import ScenarioSpace
+from dess.analysis.stats.kinds import skewness_of
 
 SAMPLES = st.lists(st.floats(0, 1), min_size=1, max_size=60)
 
@@ -216,182 +202,8 @@ def test_summary_by_several_columns_and_by_none():
     assert table.loc["success", "n"] == 5
 
 
-def test_bootstrap_keeps_pairs_together():
-    x = np.random.default_rng(3).exponential(size=30)
-    ratio = bootstrap_interval((2 * x, x), lambda a, b: a.sum() / b.sum(), np.random.default_rng(1))
-    assert ratio == pytest.approx((2.0, 2.0, 2.0))
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    ("sample", "statistic"),
-    [
-        # More than in any resample.
-        (np.arange(20.0), lambda values: len(np.unique(values))),
-        # Whichever is left out.
-        (np.array([1.0, 2.0, 2.0, 2.0, 3.0]), np.median),
-        (np.array([0.0, 1.0]), np.mean),
-        (np.array([1.0, 2.0, 5.0]), np.max),
-    ],
-)
-def test_bootstrap_where_bca_is_not_defined_has_ends(sample, statistic):
-    _, low, high = bootstrap_interval(sample, statistic, np.random.default_rng(1))
-    assert sample.min() <= low <= high <= max(sample.max(), 20)
-
-
-def test_few_values_need_a_higher_level():
-    # t(0.975, 4) sqrt(5 / 4) = 2.776445 x 1.118034 = 3.104160, of which normal: 0.998092
-    assert expanded_level(0.95, 5) == pytest.approx(0.998092, abs=1e-6)
-    assert expanded_level(0.95, 10**6) == pytest.approx(0.95, abs=1e-6)
-    assert expanded_level(0.95, 0.5) == expanded_level(0.95, 2) <= 1
-
-
-LEVELS = np.array([0.5, 0.8, 0.9])  # the product of one, two and three UAVs
-
-
-def missions_of(fleets, lead=0.0, seed=3):
-    """Missions of a policy: its product is that of the fleet, with a little noise."""
-    generator = np.random.default_rng((seed, len(fleets)))
-    product = LEVELS[fleets - 1] + generator.normal(0, 0.02, len(fleets)) + lead * (fleets == 1)
-    rows = {"point": 0, "seed": 7, "replication": range(len(fleets)), "uavs": fleets, SUCCESS: 1}
-    return pd.DataFrame(rows | {RATIO: product, PRODUCT: product, REWARD: 300 * product})
-
-
-FLEETS = np.repeat([1, 2, 3], [10, 30, 20])  # two UAVs are drawn too often
-
-
-def test_every_number_of_uavs_has_the_same_weight_by_hand():
-    # Means 1 and 3, of 5 and 10 missions.
-    values = np.array([1.0] * 5 + [2.0, 4.0] * 5)
-    linear = post_stratified(values, np.repeat([1, 2], [5, 10]))
-    assert linear.mean() == pytest.approx(2.0)
-    # the variance of the mean is (1 / 4) (0 / 5 + s^2 / 10), with s^2 = 10 / 9
-    assert linear.var(ddof=1) / 15 == pytest.approx(10 / 9 / 10 / 4)
-
-
-def test_means_differences_and_ranks_have_the_same_weights():
-    tour, greedy = missions_of(FLEETS), missions_of(FLEETS, lead=0.3, seed=4)
-    table = pd.concat([tour.assign(policy="tour"), greedy.assign(policy="greedy")])
-    of_fleets = table.groupby(["policy", "uavs"])[PRODUCT].mean().groupby("policy").mean()
-    found = summary(table).set_index(["metric", "policy"])["mean"][PRODUCT]
-    assert found.to_dict() == pytest.approx(of_fleets.to_dict())
-    assert by_replication(table, PRODUCT, "policy").mean().to_dict() == pytest.approx(
-        of_fleets.to_dict()
-    )
-    row = compare(table, "tour", [PRODUCT]).iloc[0]
-    assert row["difference"] == pytest.approx(of_fleets["greedy"] - of_fleets["tour"])
-
-
-@pytest.mark.parametrize("fleets", [[1, 1, 3, 3, 3], [1] * 9 + [3] * 9, [1] * 9 + [2] * 4, [2] * 9])
-def test_a_number_of_uavs_that_is_seldom_or_never_drawn_leaves_a_plain_mean(fleets):
-    table = missions_of(np.array(fleets))
-    row = summary(table, by=[]).set_index("metric").loc[PRODUCT]
-    assert tuple(row[["mean", "low", "high"]]) == interval_of(PRODUCT, table[PRODUCT].to_numpy())
-
-
-def test_what_some_missions_have_not_measured_has_a_plain_mean():
-    values = np.where(np.arange(60) % 4, np.arange(60.0), np.nan)
-    assert np.array_equal(post_stratified(values, FLEETS), values, equal_nan=True)
-
-
-@pytest.mark.parametrize(("missions", "uavs"), [(80, (1, 3)), (80, (1, 16)), (6, (1, 3))])
-def test_an_evaluation_has_the_means_of_the_table_and_knows_which_sizes_may_be_drawn(
-    missions, uavs
-):
-    space = ScenarioSpace.of(uavs=uavs, quota=20)
-    records = evaluate(space, "random", missions, seed=3).records.missions
-    table = pd.DataFrame(records).assign(policy="random")
-    found = estimate_means(Asked(space, "random", missions, seed=3)).moments
-    rows = summary(table).set_index("metric")
-    for metric in (SUCCESS, RATIO, PRODUCT, REWARD):
-        of_table = rows.loc[metric, ["mean", "low", "high"]].tolist()
-        assert found[metric].interval(metric) == pytest.approx(of_table, nan_ok=True)
-
-
-# --- the worst of several nodes ---
-
-NODES = 25
-
-
-def equal_nodes(rng, n):
-    """All nodes are the worst: the least of their means is too low."""
-    return rng.beta(2, 2, (n, NODES)), 0.5
-
-
-def a_variable_node(rng, n):
-    """The worst node varies much; all others are a little better, and hardly vary."""
-    values = rng.beta(2120, 1880, (n, NODES))
-    values[:, 3] = rng.random(n) < 0.5
-    return values, 0.5
-
-
-def a_seldom_forgotten_node(rng, n):
-    """In 4 % of the missions nothing is collected of a node that has the best ratio in others."""
-    values = 0.99 - 0.02 * rng.random((n, NODES))
-    values[:, 7] = rng.random(n) >= 0.04
-    return values, 0.96
-
-
-def coverage(draw, metric, n, trials):
-    """How often the interval of the worst node, and that of the one that did worst, hold it."""
-    rng = np.random.default_rng([n, trials])
-    held = np.zeros((trials, 2), bool)
-    for trial in range(trials):
-        values, mean = draw(rng, n)
-        if metric.less_is_better:
-            values, mean = metric.most * (1 - values), metric.most * (1 - mean)
-        worst = values.mean(axis=0)
-        did_worst = worst.argmax() if metric.less_is_better else worst.argmin()
-        found = interval_of(metric, worst_of_nodes(values, metric))
-        alone = interval_of(replace(metric, among=1), values[:, did_worst])
-        assert found.mean == pytest.approx(worst[did_worst])
-        held[trial] = [low <= mean <= high for _, low, high in (found, alone)]
-    return held.mean(axis=0)
-
-
-@pytest.mark.parametrize("column", [LEAST, OLDEST])
-@pytest.mark.parametrize("draw", [equal_nodes, a_variable_node, a_seldom_forgotten_node])
-def test_the_interval_of_the_worst_node_holds_its_mean(draw, column):
-    metric = replace(metric_for_length(column, 400, None), among=NODES)
-    for n in (10, 50, 100):
-        held, _ = coverage(draw, metric, n, 200)
-        assert held >= 0.93
-
-
 def test_an_interval_holds_a_mean_that_rounding_puts_beyond_its_range():
     metric = metric_for_length(OLDEST, 400, None)
     beyond = np.nextafter(metric.most, np.inf)
     found = interval_of(metric, np.full(50, beyond))
     assert found.low <= found.mean <= found.high
-
-
-def test_the_interval_of_the_node_that_did_worst_does_not():
-    metric = replace(metric_of(LEAST), among=NODES)
-    assert coverage(equal_nodes, metric, 100, 200)[1] < 0.7
-    assert coverage(a_variable_node, metric, 100, 200)[1] < 0.8
-
-
-def test_the_ends_are_those_of_all_nodes_together():
-    """The lower end is the lowest of all nodes, at a level of 1 - 5 % / 2."""
-    values = np.array([[0.4, 0.5], [0.5, 0.9], [0.45, 0.1], [0.4, 0.55]])
-    metric = replace(metric_of(LEAST), among=2)
-    found = interval_of(metric, worst_of_nodes(values, metric))
-    ends = [bounded_interval(of_node, 0.975) for of_node in values.T]
-    assert ends[1].low < ends[0].low
-    assert found.mean == pytest.approx(0.4375)
-    assert found.low == pytest.approx(ends[1].low, abs=0.04)
-    assert found.high >= ends[0].high
-    of_nodes = [Moments.of(of_node) for of_node in values.T]
-    assert Moments.of_worst_node(of_nodes, metric).interval(metric) == pytest.approx(found)
-
-
-def test_means_of_missions_are_those_of_the_node_that_is_worst_over_all():
-    """Not the mean of what is the least in each mission, and in every group its own node."""
-    ratios = [[0.2, 0.4], [0.6, 0.3], [0.9, 0.1], [0.9, 0.2]]
-    missions = pd.DataFrame({"point": [0, 0, 1, 1], "replication": [0, 1, 0, 1]})
-    missions[NODE_RATIOS] = ratios
-    missions[NODE_AGES] = [[5.0, 9.0], [7.0, 1.0], [2.0, 4.0], [3.0, 5.0]]
-    for metric, expected in ((LEAST, [0.35, 0.15]), (OLDEST, [6.0, 4.5])):
-        wide = by_replication(missions, metric, "point")
-        assert wide.mean().tolist() == pytest.approx(expected)
-        assert metric_in_missions(missions, metric).among == 2

@@ -7,7 +7,9 @@ from pydantic import ValidationError
 from dess.analysis import run_study
 from dess.analysis.answers.summary import reached_precisions
 from dess.analysis.metrics import LEAST, METRICS, OLDEST, metric_for_length, metric_group, metric_of
-from dess.analysis.stats.intervals import interval_of, share_interval, summary, worst_of_nodes
+from dess.analysis.stats.groups import summary
+from dess.analysis.stats.intervals import interval_of, share_interval
+from dess.analysis.stats.worst_node import worst_of_nodes
 from dess.analysis.study.stopping import Precision, running_interval, running_interval_of_worst
 from tests.analysis.small import SHEET, small_study
 

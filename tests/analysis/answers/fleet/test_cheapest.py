@@ -14,7 +14,8 @@ from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.metrics import COST, RATIO, metric_of
 from dess.analysis.stats.differences import compare_pairs
-from dess.analysis.stats.intervals import level_after, share_interval
+from dess.analysis.stats.intervals import share_interval
+from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.study import CHECK
 from tests.analysis.answers.fleet.test_costs import DESIGN, PRICES

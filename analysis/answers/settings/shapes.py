@@ -1,39 +1,34 @@
-"""The main effects of scenario parameters: how metrics change with each parameter.
+"""How a metric goes along the values of a field: its changes, and their shape.
 
-The functions are for designs that vary one parameter at a time, like the paper's Fig. 5. All values
-of a parameter are simulated in the same replications, so they are compared mission by mission:
+All values of a field are simulated in the same replications, so they are compared mission by
+mission:
 
-    table = means_by_field(results)
-    pairs = compare_values(results, table, "greedy", "uavs", PRODUCT)
+    pairs = compare_values(results, "greedy", "uavs", PRODUCT)
     shape_of_changes(pairs).words  # "rises"
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
-from textwrap import fill
 from typing import NamedTuple
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import summary
-from dess.analysis.answers.settings.figures import counted_missions, panel_grid
-from dess.analysis.figures import Drawing, style
-from dess.analysis.metrics import METRICS, PRODUCT, metric_of
-from dess.analysis.names import field_named, value_text
+from dess.analysis.answers.settings.effects import labels_of_field
+from dess.analysis.answers.settings.points import ordered_values
+from dess.analysis.metrics import PRODUCT
+from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, compare_pairs
-from dess.analysis.stats.intervals import LEVEL, by_replication
-from dess.analysis.tables import BARS, INTERVALS
+from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.weights import by_replication
 
 _ENDS = ["difference", "low", "high"]
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"
 
 
-ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``compare_values`` by parameter and policy
+ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``compare_values`` by field and policy
 
 
 class Shape(NamedTuple):
@@ -53,40 +48,13 @@ class Shape(NamedTuple):
     peaks: tuple[int, ...]
 
 
-def means_by_field(results: Results) -> pd.DataFrame:
-    """Means with intervals of every policy at every value of every parameter.
-
-    Returns:
-        A row per parameter, value, policy and metric: ``field``, ``value`` in words, ``position``
-        (0, 1, ... in the order of the study), and the columns of ``summary.means_of_points``.
-
-    Raises:
-        InputError: If a design point sets more or less than one field.
-    """
-    design = [point.values for point in results.store.manifest.points]
-    for number, values in enumerate(design):
-        if len(values) != 1:
-            fields = ", ".join(values) or "no field"
-            raise InputError(f"point {number}", f"sets {fields}", "one field at a time")
-    rows = [(field, value_text(value)) for values in design for field, value in values.items()]
-    table = pd.DataFrame(rows, columns=["field", "value"]).rename_axis("point").reset_index()
-    table["position"] = table.groupby("field").cumcount()
-    return table.merge(summary.means_of_points(results), on="point")
-
-
 def compare_values(
-    results: Results,
-    table: pd.DataFrame,
-    policy: str,
-    field: str,
-    metric: str,
-    fewest_uavs: int = 1,
+    results: Results, policy: str, field: str, metric: str, fewest_uavs: int = 1
 ) -> pd.DataFrame:
     """Compare every two values of a parameter on the same missions.
 
     Args:
         results: The study.
-        table: Its ``means_by_field``.
         policy: The policy.
         field: The parameter.
         metric: The metric.
@@ -98,7 +66,8 @@ def compare_values(
         once, by Bonferroni), ``p``, ``p_adjusted`` (Holm, over the pairs), ``n``, the number of
         replications, and ``student``, as in ``stats.differences.Paired``.
     """
-    positions = table[table["field"] == field].groupby("point")["position"].first()
+    labels = labels_of_field(results, field)
+    positions = labels.map(ordered_values(labels).index).astype(int)
     missions = results.missions_of(policy)
     missions = missions[missions["point"].isin(positions.index)]
     missions = missions[missions["uavs"] >= fewest_uavs]
@@ -127,7 +96,7 @@ def compare_values_by_field(
     policies = table["policy"].unique()
     fields = table.groupby("field", sort=False)["position"].nunique()
     return {
-        str(field): {p: compare_values(results, table, p, str(field), metric) for p in policies}
+        str(field): {p: compare_values(results, p, str(field), metric) for p in policies}
         for field in fields.index[fields > 1]
     }
 
@@ -158,28 +127,6 @@ def shape_of_changes(pairs: pd.DataFrame) -> Shape:
 def _rises_then_falls(peak: int, ups: pd.DataFrame, downs: pd.DataFrame) -> bool:
     """Whether there is no fall before the peak, and no rise after it."""
     return bool((downs["second"] > peak).all() and (ups["first"] < peak).all())
-
-
-def leading_policies(
-    results: Results, learned: str | None = None, heuristic: str | None = None
-) -> list[str]:
-    """The best learned policy of a study, if it has one, and its best heuristic.
-
-    Args:
-        results: The study.
-        learned: The learned policy to take instead of the best one.
-        heuristic: The heuristic to take instead of the best one.
-
-    Raises:
-        InputError: If the study lacks a policy that is named.
-    """
-    for name in (learned, heuristic):
-        if name is not None:
-            results.check_policy(name)
-    all_learned, others = summary.rank_learned_and_others(results)
-    learned = learned or next(iter(all_learned), None)
-    heuristic = heuristic or next(iter(others), None)
-    return [policy for policy in (learned, heuristic) if policy]
 
 
 def strongest_fields_sentence(
@@ -223,7 +170,7 @@ def strongest_fields(table: pd.DataFrame, policy: str, count: int = 2) -> list[s
     return [*(by_field.max() - by_field.min()).nlargest(count).index]
 
 
-def main_effects_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
+def shape_table(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
     """How product goes along every parameter, as a table to print.
 
     Beside the change of the product from the first to the last value stands that of the collection
@@ -261,74 +208,3 @@ def _format_total_change(pairs: pd.DataFrame) -> str:
     """The change from the first to the last value, in points."""
     ends = pairs[pairs["first"] == 0].sort_values("second").iloc[-1]
     return numbers.format_points(*ends[_ENDS])
-
-
-def plot_effect(
-    table: pd.DataFrame, field: str, changes: Mapping[str, pd.DataFrame], policies: list[str]
-) -> Figure:
-    """The metrics against a parameter: a part of Fig. 5.
-
-    There is a panel per metric, with the same axis for every parameter of the table, and a panel
-    with the differences from the first value, which has its own axis.
-
-    Args:
-        table: Rows of ``answers.main_effects.means_by_field``, of the policies to draw.
-        field: The parameter.
-        changes: For each policy to draw, its ``main_effects.compare_values`` in the last of
-        ``METRICS``. policies: All policies of the study, so that every policy has the same colour
-        on all pages.
-    """
-    rows = table[table["field"] == field]
-    styles = style.policy_colours(policies, changes)
-    first = rows[rows["position"] == 0]
-    steps = pd.concat(
-        [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
-    ).rename(columns={"difference": "mean", "second": "position"})
-    steps = pd.concat([first.assign(mean=0.0, low=0.0, high=0.0).drop_duplicates("policy"), steps])
-    steps["value"] = steps["position"].map(rows.set_index("position")["value"].to_dict())
-    ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
-    with style.new_panels(7.6, 4, "y", **ratios) as (figure, axes):
-        for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
-            style.plot_along(rows[rows["metric"] == metric], styles, "%", ax)
-            ax.set(
-                ylabel=fill(name, 16), ylim=style.axis_ends(table[table["metric"] == metric], 0.1)
-            )
-        style.plot_along(steps, styles, "points", axes[-1])
-        axes[-1].axhline(0, **style.ZERO)
-        title = f"Paired difference from the value at {first['value'].iloc[0]}"
-        axes[-1].set(title=title, ylabel="percentage\npoints")
-        axes[-1].set_xlabel(field_named(field).label, parse_math=True)
-    return figure
-
-
-def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
-    """The paper's metrics against every field, with all other fields as in the scenario."""
-    table = means_by_field(results)
-    for field, pairs in compare_values_by_field(results, table).items():
-        data = table[table["field"] == field]
-        caption = (
-            f"n = {counted_missions(data)} missions per point; bars are {INTERVALS}. The lowest "
-            "panel shows the paired difference from the first value, with an axis of its own: "
-            f"{BARS}"
-        )
-        alt = f"The metrics against the {field_named(field).within}"
-        yield Drawing(plot_effect(table, field, pairs, results.policies), alt, caption, data)
-
-
-def plot_one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
-    """The product against every parameter, in panels side by side with the same axis.
-
-    Args:
-        table: Rows of ``answers.main_effects.means_by_field``, of the policies to draw.
-        policies: All policies of the study, so that every policy has the same colour on all pages.
-    """
-    rows = table[table["metric"] == PRODUCT]
-    fields = [*rows["field"].unique()]
-    styles = style.policy_colours(policies, rows["policy"])
-    with panel_grid(3.4, len(fields), len(fields)) as (figure, axes):
-        for ax, field in zip(axes, fields, strict=True):
-            style.plot_along(rows[rows["field"] == field], styles, "%", ax)
-            ax.set_xlabel(fill(field_named(field).label, 24), parse_math=True)
-            ax.tick_params(axis="x", labelsize=8)
-        figure.supylabel(metric_of(PRODUCT).label, fontsize=10)
-    return figure

@@ -1,4 +1,4 @@
-"""Main effects compare values of a parameter on the same missions."""
+"""The shape of a metric along a field: its values are compared on the same missions."""
 
 from dataclasses import replace
 
@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 
 from dess import InputError
-from dess.analysis.answers import main_effects
-from dess.analysis.answers.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
+from dess.analysis.answers.settings import effects, shapes
+from dess.analysis.answers.settings.shapes import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
+from dess.analysis.answers.summary import leading_policies, means_of_points
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import adjust_p_values, compare_pairs
-from dess.analysis.stats.intervals import by_replication
+from dess.analysis.stats.weights import by_replication
 from tests.analysis.small import grid
 
 
@@ -20,11 +21,6 @@ def results(studied):
     values = {"uavs": [1, 2], "initial_data": [[5, 7.5], 10, [2, 20]]}
     design = {"kind": "one-at-a-time", "values": values}
     return studied(design=design, missions=20)
-
-
-@pytest.fixture(scope="module")
-def table(results):
-    return main_effects.means_by_field(results)
 
 
 def pairs_of(steps, sure=True, half=0.001, widened=2):
@@ -41,18 +37,31 @@ def pairs_of(steps, sure=True, half=0.001, widened=2):
     return table.assign(**ends, p_adjusted=p)
 
 
-def test_success_is_compared_where_the_number_of_uavs_is_drawn(results, table):
+def test_success_is_compared_where_the_number_of_uavs_is_drawn(results):
     """Its post-stratified values lie outside [0, 1]."""
     missions = results.missions.assign(success=results.missions["replication"] % 2)
     found = replace(results, missions=missions)
-    pairs = main_effects.compare_values(found, table, "random", "initial_data", SUCCESS)
+    pairs = shapes.compare_values(found, "random", "initial_data", SUCCESS)
     assert (pairs["difference"] == 0).all() and (pairs["low"] < 0).all()
+
+
+def test_a_field_has_the_means_of_the_points_that_set_it(results):
+    """Not those of points that set another field, at which it is as in the scenario."""
+    table = effects.means_by_field(results)
+    means = means_of_points(results).set_index(["policy", "point", "metric"])
+    of_points = {"uavs": [0, 1], "initial_data": [2, 3, 4]}
+    assert table.groupby("field")["position"].max().to_dict() == {"uavs": 1, "initial_data": 2}
+    for row in table.itertuples():
+        expected = means.loc[(row.policy, of_points[row.field][row.position], row.metric)]
+        assert (row.mean, row.low, row.high, row.n) == pytest.approx(tuple(expected))
+    rows = table[table["field"] == "initial_data"]
+    assert [*rows["value"].unique()] == ["5–7.5", "10", "2–20"]
 
 
 def test_a_design_of_several_fields_is_refused(studied):
     several = studied(design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
     with pytest.raises(InputError, match="point 0: sets uavs, quota"):
-        main_effects.means_by_field(several)
+        effects.means_by_field(several)
 
 
 @pytest.mark.parametrize(
@@ -69,24 +78,22 @@ def test_a_design_of_several_fields_is_refused(studied):
     ],
 )
 def test_shapes(steps, words, peaks):
-    assert main_effects.shape_of_changes(pairs_of(steps)) == main_effects.Shape(words, peaks)
-    assert main_effects.shape_of_changes(pairs_of(steps, sure=False)).words == LEVELS
+    assert shapes.shape_of_changes(pairs_of(steps)) == shapes.Shape(words, peaks)
+    assert shapes.shape_of_changes(pairs_of(steps, sure=False)).words == LEVELS
 
 
 def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
     means = results.missions.groupby("policy")[PRODUCT].mean()
-    assert main_effects.leading_policies(results) == [means.idxmax()]
-    named = main_effects.leading_policies(results, means.idxmax(), means.idxmin())
+    assert leading_policies(results) == [means.idxmax()]
+    named = leading_policies(results, means.idxmax(), means.idxmin())
     assert named == [means.idxmax(), means.idxmin()]
     with pytest.raises(InputError, match="policy: 'learned' is not in the study"):
-        main_effects.leading_policies(results, "learned", means.idxmin())
+        leading_policies(results, "learned", means.idxmin())
 
 
-def test_changes_are_paired_by_replication(results, table):
+def test_changes_are_paired_by_replication(results):
     """Intervals that hold for all three pairs at once are wider, by Bonferroni."""
-    pairs = main_effects.compare_values(
-        results, table, "greedy", "initial_data", "collection_ratio"
-    )
+    pairs = shapes.compare_values(results, "greedy", "initial_data", "collection_ratio")
     assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
     missions = results.missions.query("policy == 'greedy'")
     values = by_replication(missions, "collection_ratio", "point")
@@ -114,7 +121,7 @@ def test_the_answer_says_of_every_policy_where_a_parameter_leads():
             "greedy": pd.DataFrame({**pair, "p_adjusted": [0.2]}),
         }
     }
-    said = main_effects.strongest_fields_sentence(table, ["learned", "greedy"], changes)
+    said = shapes.strongest_fields_sentence(table, ["learned", "greedy"], changes)
     assert (
         "of learned depends most on the communication quota (from 90.0 % at 440 to 78.5 % at 600)."
         in said
