@@ -220,6 +220,7 @@ EXAMPLES = [m for m, tree in LIBRARY.items() if any(">>> " in t for _, t in docs
 @pytest.mark.parametrize("module", EXAMPLES)
 def test_examples_print_what_they_say(module, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(builtins, "_", None, raising=False)  # examples leave their last value
     loaded = import_module(module)
     found = doctest.testmod(loaded, extraglobs=AT_HAND, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert found.attempted and not found.failed
