@@ -11,7 +11,7 @@ from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 
 import dess
-from dess.envs.integrations.benchmarl import HarvestTask
+from dess.envs.integrations.benchmarl import FleetMeans, HarvestTask
 
 
 def experiment(scenario, algorithm, slots, out, per_batch=2000, seed=0):
@@ -32,6 +32,7 @@ def experiment(scenario, algorithm, slots, out, per_batch=2000, seed=0):
         critic_model_config=MlpConfig.get_from_yaml(),
         seed=seed,
         config=config,
+        callbacks=[FleetMeans()],
     )
 
 

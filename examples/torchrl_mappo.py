@@ -50,7 +50,7 @@ def train(scenario, slots, per_batch=2000, seed=0):
     loss.make_value_estimator(ValueEstimators.GAE, gamma=0.99, lmbda=0.95)
     optimizer = torch.optim.Adam(loss.parameters(), 3e-4)
     for batch in Collector(env, actor, frames_per_batch=per_batch, total_frames=slots):
-        print(f"reward per slot and UAV: {batch['next', 'uav', 'reward'].mean():.3f}")
+        print(f"reward of a UAV per slot: {mean_reward(batch):.3f}")
         batch["next", "uav", "reward"] /= 100.0  # so that the critic's values are about 1
         with torch.no_grad():
             loss.value_estimator(batch, params=loss.critic_network_params)
@@ -61,6 +61,12 @@ def train(scenario, slots, per_batch=2000, seed=0):
             optimizer.step()
             optimizer.zero_grad()
     return policy
+
+
+def mean_reward(batch):
+    """The mean reward of a slot, without UAVs that have ended or that the fleet does not have."""
+    acts = batch["uav", "info", "active"] > 0
+    return batch["next", "uav", "reward"].squeeze(-1)[acts].mean()
 
 
 class Mappo(Adapter):

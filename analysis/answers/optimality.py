@@ -76,6 +76,14 @@ def fleets_with_useful_bound(table: pd.DataFrame) -> pd.DataFrame:
     return table[(table["uavs"] != ALL) & says]
 
 
+def nearest_sentence(table: pd.DataFrame) -> str:
+    """Which policy comes nearest to the bound, of the rows of ``fleets_with_useful_bound``."""
+    row = table.loc[table[GAP].idxmin()]
+    gap = _format_gap(*row[[GAP, f"{GAP}_low", f"{GAP}_high"]])
+    fleet = numbers.format_count(row["uavs"], "UAV")
+    return f"{row['policy']} comes nearest to the bound: {gap} points with {fleet}."
+
+
 def in_words(results: Results, policy: str | None = None) -> str:
     """How far a policy is from the best possible at most, for fleets with a useful bound.
 

@@ -16,7 +16,7 @@ from dess.analysis.answers.policies.decision_times import (
     decision_time_front,
     plot_decision_times,
 )
-from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import Drawing, name_best_mean, style
 from dess.analysis.figures import comparison as figures
 from dess.analysis.figures import missions as maps
 from dess.analysis.metrics import PRODUCT, RATIO, SUCCESS, metric_of
@@ -115,8 +115,19 @@ def by_fleet(table: pd.DataFrame) -> Drawing:
     return Drawing(
         figures.plot_differences(rows, names, f"Difference from {baseline}"),
         f"Paired differences from {baseline} in the product, by number of UAVs",
-        f"n = {numbers.format_span(rows['n'])} missions; {BARS}",
+        f"{_largest_in_words(rows)} n = {numbers.format_span(rows['n'])} missions; {BARS}",
     )
+
+
+def _largest_in_words(rows: pd.DataFrame) -> str:
+    """The largest difference by number of UAVs, as a sentence."""
+    by_fleet = rows[rows["uavs"] != ALL]
+    if by_fleet.empty:
+        by_fleet = rows
+    row = by_fleet.loc[by_fleet["difference"].abs().idxmax()]
+    points = numbers.format_points(row["difference"], row["low"], row["high"])
+    fleet = "all fleets" if row["uavs"] == ALL else numbers.format_count(row["uavs"], "UAV")
+    return f"The largest difference is that of {row['policy']} with {fleet}: {points} points."
 
 
 def draw_decision_time_front(results: Results, times: Times) -> Drawing:
@@ -132,7 +143,8 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     return Drawing(
         plot_decision_times(points),
         "Decision time against the product of all policies, and their Pareto front",
-        "No policy is both faster and better than one on the line. Medians on one core.",
+        f"{name_best_mean(points, PRODUCT, ['policy'])}No policy is both faster and better than "
+        "one on the line. Medians on one core.",
         points,
     )
 
@@ -281,10 +293,17 @@ def at_home(results: Results, policies: Sequence[str]) -> Drawing:
     table = pd.concat(tables, ignore_index=True)
     rows = table.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), table["share"]))
     logged = len(_logged_replications(results, policies[0]))
+    weighted = table.assign(inside=table["share"] * table["n"]).groupby("policy", sort=False)
+    sums = weighted[["inside", "n"]].sum()
+    shares = [
+        f"{numbers.format_percent(row.inside / row.n)} with {row.Index}"
+        for row in sums.itertuples()
+    ]
     return Drawing(
         maps.plot_courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
         "The share of the UAVs in the charging zone over the slots",
-        f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
+        f"{numbers.join_words(shares)} of the UAVs are in the zone in a slot, in the mean. n = "
+        f"{logged} missions. A UAV that has filled its quota has left the mission.",
         table,
     )
 
@@ -363,7 +382,8 @@ def draw_prices(results: Results, replication: int) -> Drawing:
     return Drawing(
         node_map(results.scenario(), "Price of a node's data", values, write="{:.2f}".format),
         "The price of every node's data in the upper bound",
-        f"n = 1, mission {replication}: what one more data unit would add to the upper bound.",
+        f"The highest price is {values.max():.2f}. n = 1, mission {replication}: what one more "
+        "data unit would add to the upper bound.",
     )
 
 

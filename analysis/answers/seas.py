@@ -20,7 +20,7 @@ from dess.analysis.answers.policies.decision_times import (
     decision_time_front,
     plot_decision_times,
 )
-from dess.analysis.figures import Drawing, style
+from dess.analysis.figures import Drawing, name_best_mean, style
 from dess.analysis.metrics import BOUND, PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import column_tests, relative_change
@@ -141,7 +141,8 @@ def draw_decision_time_front(results: Results, times: Times) -> Drawing:
     return Drawing(
         plot_decision_times(points),
         "Time of a decision against the product over all seas, and the Pareto front",
-        f"n = {points['n'].max()} seas; bars are 95 % intervals over seas. Times are those of a "
+        f"{name_best_mean(points, PRODUCT, ['policy'])}n = {points['n'].max()} seas; bars are 95 % "
+        "intervals over seas. Times are those of a "
         "decision for a UAV on one core, many missions side by side.",
         points,
     )

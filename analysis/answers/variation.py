@@ -357,6 +357,26 @@ class Variation:
             for policy, of_policy in gaps.items()
         )
 
+    def finding(self) -> str:
+        """The caption of the figure of all differences: which policy gains or loses most."""
+        rows = [*self._of_product()]
+        row = max(rows, key=lambda of_policy: abs(of_policy.difference))
+        most = " most" if len(rows) > 1 else ""
+        doubt = _DOUBTS.get(judge_difference(row), "")
+        return (
+            f"The product changes{most} with {row.policy}: by {format_change(row)} points{doubt}."
+        )
+
+    def finding_of(self, metric: str) -> str:
+        """The caption of the figure of a metric: its means in the baseline and the variation."""
+        table = self.table()
+        measure = metric_of(metric)
+        parts = [
+            f"from {measure.write(row.before)} to {measure.write(row.after)} with {row.policy}"
+            for row in table[table["metric"] == metric].dropna(subset="difference").itertuples()
+        ]
+        return f"{measure.name}: {numbers.join_words(parts)}." if parts else f"{measure.name}."
+
     def contrasts(self) -> str:
         """In words: the policies that are better in most missions and worse on average, or so.
 

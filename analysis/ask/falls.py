@@ -4,7 +4,8 @@ fall_sentences(results)  # results of a search, of which ``around.question_aroun
 draw_falls(results)
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -14,12 +15,13 @@ from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
 from dess.analysis.metrics import NODE_RATIOS, RATIO, metric_of
-from dess.analysis.results.resimulate import resimulate
+from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import compare, differences_of, t_test
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
+    BELOW,
     INCONCLUSIVE,
     NOT_RULED_OUT,
     SEEN_WORSE,
@@ -28,6 +30,8 @@ from dess.analysis.stats.verdict import (
     judge_difference,
     position_of,
 )
+from dess.scenario.data_sheet import Units
+from dess.scenario.quantities import printed
 
 MISSIONS = 10  # of the fleet, and of each neighbour that collects less
 NAMED = 3  # the largest number of activities that a sentence names
@@ -45,10 +49,13 @@ class Fall:
         is_certain: Whether a rare failure is ruled out as its cause.
         shares: (MISSIONS, activities) the shares of time.
         shares_before: The same of the fleet, in the same missions.
-        nodes: (K,) the mean share of the data of each node that is collected; none in results of
-            earlier versions.
+        last_data: (MISSIONS,) when the last data are collected [slots].
+        last_data_before: The same of the fleet.
+        nodes: (n, K) the share of the data of each node that is collected in each mission; none in
+            results of earlier versions.
         nodes_before: The same of the fleet.
         titles: What the nodes are called.
+        units: What a slot is, of missions with a data sheet.
     """
 
     fleet: str
@@ -58,9 +65,12 @@ class Fall:
     is_certain: bool
     shares: pd.DataFrame
     shares_before: pd.DataFrame
+    last_data: np.ndarray
+    last_data_before: np.ndarray
     nodes: np.ndarray
     nodes_before: np.ndarray
     titles: list[str]
+    units: Units | None
 
     def sentence(self) -> str:
         """How much less is collected, what the UAVs do instead, and whose fault it is."""
@@ -71,21 +81,44 @@ class Fall:
             doubt = f" in what was seen ({NOT_RULED_OUT})"
         return (
             f"With {self.fleet} instead of {self.before}, the {metric.within} is lower{doubt}, by "
-            f"{change} points: {self._changes_of_time()}. {self._worst_node()}This is due to "
+            f"{change} points: {self._changes_of_time()}. {self._last_data()}"
+            f"{self._worst_node()}This is due to "
             f"the policy {self.policy} and its return guard, not to the fleet: it could do as "
             "well as the smaller one if what is added stayed unused."
         )
 
+    def _last_data(self) -> str:
+        """When the last data are collected, if earlier than before, with a space behind it.
+
+        The shares of time do not tell it: UAVs may charge as long as before, but all at the end.
+        """
+        change, _ = t_test(differences_of(self.last_data, self.last_data_before), LEVEL)
+        if position_of(change) != BELOW:
+            return ""
+        last = self._time_in_words(self.last_data.mean())
+        last_before = self._time_in_words(self.last_data_before.mean())
+        return f"The last data of a mission are collected after {last} instead of {last_before}. "
+
+    def _time_in_words(self, slots: float) -> str:
+        if self.units is None:
+            return f"{slots:.1f} mission slots"
+        return printed(slots * self.units.slot, "s")
+
     def _worst_node(self) -> str:
-        """The node that loses most, in a sentence with a space behind it."""
+        """The node that loses most, if the missions show that it does, with a space behind it."""
         if not len(self.nodes):
             return ""
-        node = int((self.nodes - self.nodes_before).argmin())
-        share = numbers.format_percent(self.nodes[node])
-        share_before = numbers.format_percent(self.nodes_before[node])
+        node = int((self.nodes - self.nodes_before).mean(axis=0).argmin())
+        metric = replace(metric_of(RATIO), among=self.nodes.shape[1])
+        differences = differences_of(self.nodes[:, node], self.nodes_before[:, node])
+        change, _ = t_test(differences, metric.level_of_each(LEVEL))
+        if position_of(change) != BELOW:
+            return ""
+        share = numbers.format_percent(self.nodes[:, node].mean())
+        share_before = numbers.format_percent(self.nodes_before[:, node].mean())
         return (
             f"The node that loses most is {self.titles[node]}, from {share_before} to {share} of "
-            "its data. "
+            f"its data ({metric.change(*change)} points). "
         )
 
     def _changes_of_time(self) -> str:
@@ -133,6 +166,8 @@ def _compare_neighbours(results: Results) -> list[Fall]:
         verdict = better_or_worse(judge_difference(differences.loc[point]), RATIO)
         if verdict not in (WORSE, SEEN_WORSE):
             continue
+        shares, last_data = _measure_times(changed_results, point)
+        shares_before, last_data_before = _measure_times(changed_results, 0)
         falls.append(
             Fall(
                 fleet=around.change_in_words(space, change),
@@ -140,11 +175,14 @@ def _compare_neighbours(results: Results) -> list[Fall]:
                 policy=changed_results.policies[0],
                 difference=differences.loc[point],
                 is_certain=verdict == WORSE,
-                shares=_measure_shares(changed_results, point),
-                shares_before=_measure_shares(changed_results, 0),
-                nodes=_mean_ratios_of_nodes(changed_results, point),
-                nodes_before=_mean_ratios_of_nodes(changed_results, 0),
+                shares=shares,
+                shares_before=shares_before,
+                last_data=last_data,
+                last_data_before=last_data_before,
+                nodes=_ratios_of_nodes(changed_results, point),
+                nodes_before=_ratios_of_nodes(changed_results, 0),
                 titles=node_titles(space, range(len(space.nodes))),
+                units=space.units,
             )
         )
     return falls
@@ -185,22 +223,30 @@ def _change_back(change: dict[str, int]) -> dict[str, int]:
     return {field: value - 1 for field, value in change.items()}
 
 
-def _mean_ratios_of_nodes(results: Results, point: int) -> np.ndarray:
-    """(K,) the mean share of the data of each node that is collected at a design point."""
+def _ratios_of_nodes(results: Results, point: int) -> np.ndarray:
+    """(n, K) the share of the data of each node that is collected in each mission of a point."""
     missions = results.missions[results.missions["point"] == point]
     if NODE_RATIOS not in missions:
         return np.array([])
-    return np.asarray(np.mean([*missions[NODE_RATIOS]], axis=0))
+    return np.stack([*missions.sort_values("replication")[NODE_RATIOS]])
 
 
-@compute_once  # the fleet is compared with each of its neighbours
-def _measure_shares(results: Results, point: int) -> pd.DataFrame:
-    """The shares of time in the first missions of a design point, a row each."""
+def _first_missions(results: Results, point: int) -> Iterator[LoggedMission]:
+    """The first missions of a design point, simulated again."""
     policy = results.policies[0]
     missions = results.missions_of(policy)
     replications = sorted(missions.loc[missions["point"] == point, "replication"])[:MISSIONS]
-    shares = []
     for replication in replications:
-        mission = resimulate(results, policy, point, replication)
-        shares.append(share_of_activities(mission.events, mission.scenario))
-    return pd.DataFrame(shares)
+        yield resimulate(results, policy, point, replication)
+
+
+@compute_once  # the fleet is compared with each of its neighbours
+def _measure_times(results: Results, point: int) -> tuple[pd.DataFrame, np.ndarray]:
+    """The shares of time in the first missions of a design point, and when they collect last."""
+    shares = []
+    last = []
+    for mission in _first_missions(results, point):
+        log = pd.DataFrame(mission.events)
+        shares.append(share_of_activities(log, mission.scenario))
+        last.append(log.loc[log["event"] == "communication", "time"].max())
+    return pd.DataFrame(shares), np.array(last)

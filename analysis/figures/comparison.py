@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
@@ -60,6 +61,8 @@ def plot_sides(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure
         ax.set_xticks((0, 1), sides)
         if metric in METRICS:
             ax.set_ylim(style.axis_ends(rows, 0.05))
+        last = rows.sort_values("position").groupby("policy", sort=False).last()
+        style.name_lines({name: (1.05, mean) for name, mean in last["mean"].items()}, ax)
     return figure
 
 
@@ -89,6 +92,14 @@ def plot_difference_spread(differences: Mapping[str, pd.Series]) -> Figure:
             ax.set_title(title)
             style.set_axis_unit(ax.xaxis, "points", 7)
         axes[1].set(xlim=central_range([*differences.values()], TAIL), xlabel="percentage points")
+        shares = np.linspace(0, 1, len(differences) + 2)[1:-1]
+        halfway = {
+            name: (float(of_policy.quantile(share)), share)
+            for share, (name, of_policy) in zip(shares, differences.items(), strict=True)
+        }
+        if style.name_lines(halfway, axes[1]):
+            for line in axes[0].lines:
+                line.set_label(f"_{line.get_label()}")
     return figure
 
 
@@ -104,7 +115,9 @@ def plot_gaps(table: pd.DataFrame) -> Figure:
         for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
             bound, low, high = rows[[BOUND, f"{BOUND}_low", f"{BOUND}_high"]].iloc[0]
             ax.axvspan(low, high, **style.band(style.MUTED))
-            ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
+            ax.axvline(bound, color=style.INK, linewidth=1.3, gid="bound")
+            ax.annotate("upper bound ", (bound, 0.97), xycoords=("data", "axes fraction"),
+                        ha="right", va="top", fontsize=9, color=style.INK)  # fmt: skip
             style.plot_in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
             ax.set(title=f"{format_count(uavs, 'UAV')}: bound {bound:.1%}", xlim=(-0.02, 1.02))
             style.set_axis_unit(ax.xaxis, "%")
@@ -127,6 +140,9 @@ def plot_differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure
         style.plot_along(rows, styles, "points", ax, linestyle="")
         ax.set(title=f"{title} (paired)", ylabel="percentage points")
         ax.margins(x=0.2)
+        last = rows.sort_values("position").groupby("policy", sort=False).last()
+        beside = last["position"] + 0.03 * np.ptp(rows["position"])
+        style.name_lines({name: (beside[name], last["mean"][name]) for name in last.index}, ax)
     return figure
 
 

@@ -24,6 +24,7 @@ import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
 from matplotlib.colors import to_hex, to_rgb
+from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
@@ -305,6 +306,43 @@ def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
     """A note in the right margin, at a level of the y axis."""
     return ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
                        textcoords="offset points", va="center", fontsize=size)  # fmt: skip
+
+
+MOST_NAMED_LINES = 4  # lines that have their names beside them; of more, a legend is below
+_HEIGHT_OF_NAME = 0.06  # of the axes
+
+
+def name_lines(places: Mapping[str, tuple[float, float]], ax: Axes) -> bool:
+    """Write the name of each line beside it, in its colour, where it would be in a legend.
+
+    Names that would cover each other are moved apart. Of more than ``MOST_NAMED_LINES`` lines, the
+    names stay in the legend.
+
+    Args:
+        places: By the label of a line, its place [data], to the right of which it is named.
+        ax: The axes, with the limits that they keep.
+
+    Returns:
+        Whether they are named.
+    """
+    lines = {name: line for line, name in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if len(places) > MOST_NAMED_LINES or not {*places} <= {*lines}:
+        return False
+    to_axes = ax.transData + ax.transAxes.inverted()
+    ends = {name: to_axes.transform(place) for name, place in places.items()}
+    lowest = -np.inf
+    for name in sorted(ends, key=lambda name: ends[name][1]):
+        x, y = ends[name]
+        lowest = max(y, lowest + _HEIGHT_OF_NAME)
+        line = lines[name]
+        artist: Any = line
+        if isinstance(line, ErrorbarContainer):
+            artist = line.lines[0]
+        ax.annotate(name, (x, lowest), xycoords="axes fraction", xytext=(7, 0), fontsize=9,
+                    textcoords="offset points", va="center", color=artist.get_color(),
+                    gid=f"name-{name}", zorder=10, **OUTLINED)  # fmt: skip
+        line.set_label(f"_{name}")
+    return True
 
 
 MOST_TICKS = 12

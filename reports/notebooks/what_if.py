@@ -52,7 +52,8 @@ make_answer(variation.sentence())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
+about = f"{variation.finding()} {pairs}; {tables.BARS}"
+lead_figure(variation.plot(), "Paired differences of the metrics", about)
 
 # %%
 sides = found.scenario(0), found.scenario(1)
@@ -72,14 +73,17 @@ extended = [metric for metric in measured_columns(found) if found.missions[metri
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
-spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
+spread = f"In {pairs}, {variation.winners()}. The lower panel ends at the 5 % and 95 % quantiles."
 make_gallery(
     [
         (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
         *(
-            (variation.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
+            (
+                variation.plot_means(metric),
+                f"{metric_of(metric).name}, baseline and variation",
+                f"{variation.finding_of(metric)} {caption}",
+            )
             for metric in (*metrics.METRICS, *extended)
-            for name in [metric_of(metric).name]
         ),
     ]
 )

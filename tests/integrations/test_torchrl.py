@@ -56,6 +56,9 @@ def test_contract(tmp_path, scenario):
     assert ends == 3 and waits
 
     example = runpy.run_path(str(EXAMPLE))
+    flown = ~ended.squeeze(-1) if ended.dim() > 2 else ~ended
+    expected = after["reward"].squeeze(-1)[flown].mean()
+    torch.testing.assert_close(example["mean_reward"](mission), expected)
     short, long = (example["train"](SHORT, slots, per_batch=60) for slots in (60, 120))
     for before, later in zip(short.parameters(), long.parameters(), strict=True):
         assert later.isfinite().all() and (before != later).any()

@@ -252,4 +252,6 @@ def plot_decision_times(table: pd.DataFrame) -> Figure:
         ax.xaxis.set_major_formatter(lambda time, _: numbers.format_seconds(time))
         ax.xaxis.set_minor_locator(NullLocator())
         style.set_axis_unit(ax.yaxis, "%")
+        places = table.set_index("policy")[["seconds", "mean"]]
+        style.name_lines({name: tuple(place) for name, place in places.iterrows()}, ax)
     return figure

@@ -155,7 +155,10 @@ def draw_difference_distribution(missions: pd.DataFrame, pair: Pair) -> Drawing:
     """
     values = np.sort(missions["difference"].to_numpy(float))
     lowest, highest = (numbers.format_difference(end, 0) for end in values[[0, -1]])
+    ahead = numbers.format_percent((values > 0).mean())
+    behind = numbers.format_percent((values < 0).mean())
     caption = (
+        f"{pair.policy} is ahead in {ahead} of the missions and behind in {behind}. "
         f"Share of the missions (n = {len(values):,}) with at most the difference on the axis, "
         f"with a 95 % band for the whole curve; from {lowest} to {highest} points."
     )

@@ -123,10 +123,19 @@ def draw_differences_along_parameters(
         Drawing(
             _plot_difference_along(rows, overall, style.axis_ends(lead, zero=True)),
             f"Mean difference {pair.title} against {field}",
-            f"{note}n = {numbers.format_span(rows['n'])} missions per dot.",
+            f"{_range_in_words(rows)} {note}n = {numbers.format_span(rows['n'])} missions per dot.",
         )
         for field, rows in lead.groupby("field", sort=False)
     ]
+
+
+def _range_in_words(rows: pd.DataFrame) -> str:
+    """Where along a parameter the mean difference is the lowest, and where the highest."""
+    ends = [
+        f"{numbers.format_points(row['mean'], row['low'], row['high'])} points at {row['value']}"
+        for row in (rows.loc[rows["mean"].idxmin()], rows.loc[rows["mean"].idxmax()])
+    ]
+    return f"From {' to '.join(ends)}."
 
 
 def _plot_difference_along(rows: pd.DataFrame, overall: float, ends: tuple[float, float]) -> Figure:

@@ -105,7 +105,8 @@ drawn = [front._replace(caption=f"{front.caption} {counted}")]
 if len(useful := optimality.fleets_with_useful_bound(bounds)):
     alt = "The product of every policy and the upper bound, by number of UAVs"
     counted = (
-        f"n = {numbers.format_span(useful['n'])} missions. The band is the interval of the bound."
+        f"{optimality.nearest_sentence(useful)} n = {numbers.format_span(useful['n'])} missions. "
+        "The band is the interval of the bound."
     )
     drawn.append(Drawing(plot_gaps(useful), alt, counted))
 make_gallery(drawn, "Bars are 95 % intervals.")

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from dess.analysis import load_results
@@ -18,8 +19,10 @@ from dess.analysis.flights.phases import (
     WAITS,
     share_of_activities,
 )
+from dess.analysis.results.resimulate import resimulate
 from dess.model.events import EventLog
 from dess.reports.pages.study import make_study_report
+from dess.scenario.quantities import printed
 from tests.analysis.flights.hand import scenario_of, write_sea
 from tests.analysis.small import SHEET, write_scenario
 from tests.reports.small import said_by
@@ -106,13 +109,39 @@ def test_an_answer_says_why_one_more_uav_collects_less(searched):
     node = np.argmin(now - before)
     x, y = BUSY["nodes"][node]
     named = f"The node that loses most is [{x}, {y}], from {before[node]:.1%} to {now[node]:.1%}"
-    assert named.replace("%", " %") in text
+    assert f"{named.replace('%', ' %')} of its data ({100 * (now - before)[node]:+.1f}".replace(
+        "-", "−"
+    ) in text.replace("-", "−")
     assert "due to the policy greedy and its return guard, not to the fleet" in text
     assert text in brief_sentences(searched)
     (drawing,) = falls.draw_falls(searched)
     assert DRAWN in drawing.caption
     bars = drawing.figure.axes[0].patches
     assert sum(bar.get_width() for bar in bars) == pytest.approx(3)  # of the fleet, UAV and pad
+
+
+def test_a_fall_says_when_the_last_data_are_collected(searched):
+    """Where that is earlier than with the fleet: the shares of time need not differ."""
+    fall = falls.find_falls(searched)[0]
+    last = fall.last_data_before
+    log = resimulate(around.load_around(searched), "greedy", 0, 0).events
+    served = pd.DataFrame(log).query("event == 'communication'")
+    assert last[0] == served["time"].max()
+    same = replace(fall, shares=fall.shares_before, last_data=last)
+    assert "last data" not in same.sentence()
+    earlier = replace(same, last_data=last - 20 - np.arange(len(last)))
+    text = earlier.sentence()
+    assert "the shares of time of the UAVs do not differ significantly" in text
+    slot = fall.units.slot
+    means = [printed(slots.mean() * slot, "s") for slots in (earlier.last_data, last)]
+    said = f"The last data of a mission are collected after {means[0]} instead of {means[1]}. "
+    assert said in text
+
+
+def test_a_node_is_named_only_if_the_missions_show_that_it_loses(searched):
+    fall = falls.find_falls(searched)[0]
+    noise = np.random.default_rng(5).normal(0, 0.1, fall.nodes.shape)
+    assert "loses most" not in replace(fall, nodes=fall.nodes_before + noise).sentence()
 
 
 @pytest.mark.slow

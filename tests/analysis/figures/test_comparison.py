@@ -56,8 +56,9 @@ def test_a_panel_per_fleet_shows_products_and_the_bound():
     for ax, (_, rows) in zip(figure.axes, table.groupby("uavs"), strict=True):
         bars = [bar.lines[0].get_xdata()[0] for bar in ax.containers]
         assert bars == pytest.approx(rows[PRODUCT])
-        (bound,) = (line for line in ax.lines if line.get_label() == "upper bound")
+        (bound,) = (line for line in ax.lines if line.get_gid() == "bound")
         assert bound.get_xdata()[0] == rows[BOUND].iloc[0]
+        assert [text.get_text() for text in ax.texts] == ["upper bound "]
         assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two"]
     assert figure.axes[1].get_title(loc="left").startswith("2 UAVs: bound")
 
@@ -84,3 +85,23 @@ def test_the_caption_names_the_best_mean():
     assert sentence == "The highest mean is 90.0 %, of policy greedy, 2 UAVs. "
     assert name_best_mean(rows, AGE, ["uavs"]).startswith("The lowest mean is 0.6")
     assert name_best_mean(rows.assign(mean=1.0), PRODUCT, ["uavs"]) == ""
+
+
+def test_few_lines_have_their_names_beside_them_and_many_a_legend():
+    """Names of lines that end at the same place are moved apart."""
+    rows = pd.DataFrame({"point": [0, 1] * 3, "policy": [*"aabbcc"], "metric": SUCCESS})
+    rows = rows.assign(mean=[0.2, 0.5, 0.3, 0.5, 0.4, 0.9])
+    rows = rows.assign(low=rows["mean"] - 0.03, high=rows["mean"] + 0.01)
+    figure = comparison.plot_sides(rows, SUCCESS, ["before", "after"])
+    (ax,) = figure.axes
+    names = {text.get_text(): text for text in ax.texts}
+    looks = style.policy_colours("abc")
+    assert {*names} == {*"abc"} and not figure.legends
+    assert {name: text.get_color() for name, text in names.items()} == {
+        name: colour for name, (colour, _) in looks.items()
+    }
+    heights = sorted(text.xy[1] for text in names.values())
+    assert min(np.diff(heights)) >= 0.059
+    many = pd.concat([rows.assign(policy=rows["policy"] + str(n)) for n in range(2)])
+    figure = comparison.plot_sides(many, SUCCESS, ["before", "after"])
+    assert figure.legends and not figure.axes[0].texts

@@ -203,6 +203,17 @@ def test_any_variation_has_a_panel_or_a_sentence(baseline, variation):
     assert 'id="panel"' in made or "cannot simulate by itself" in made
 
 
+def test_a_panel_says_that_it_has_no_requirements_of_the_worst_node():
+    """A fleet that keeps only the others would be called right."""
+    space = load_scenario("jade-bight")
+    required = [Requirement(metric_of(name), 0.5) for name in ("success", "least")]
+    panel = str(make_panel(space, space, "jade-bight", ["greedy"], SEED, None, required).data)
+    assert "since it does not know what is collected of each node" in panel
+    assert '<option value="success" selected>' not in panel
+    panel = str(make_panel(space, space, "jade-bight", ["greedy"], SEED, None, required[:1]).data)
+    assert '<option value="success" selected>' in panel
+
+
 def test_what_cannot_be_simulated_in_a_page_is_a_sentence():
     space = load_scenario("paper", arrivals={"process": "continuous"})
     assert "continuous time" in make_panel(space, space, "paper", ["greedy"], SEED).data
