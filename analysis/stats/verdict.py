@@ -52,8 +52,8 @@ class Verdict(StrEnum):
     @classmethod
     def of_all(cls, verdicts: Iterable[str]) -> "Verdict":
         """The verdict on several requirements, or conditions, together: the most serious one."""
-        given = {*verdicts}
-        return next(verdict for verdict in cls if verdict in given)
+        all_verdicts = {*verdicts}
+        return next(verdict for verdict in cls if verdict in all_verdicts)
 
 
 # By whether a bound is known to be kept, and whether it is known to be broken. Both are known only
