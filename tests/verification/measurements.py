@@ -15,7 +15,7 @@ import pandas as pd
 from dess import simulate, simulate_batch
 from dess.analysis.answers.missions import of_nodes
 from dess.analysis.results import event_log
-from dess.analysis.results.resimulate import Mission, difference_in_words, stored_record
+from dess.analysis.results.resimulate import LoggedMission, difference_in_words, stored_record
 from dess.analysis.results.tables import Results
 from dess.model.state import HOVER
 from dess.model.view import View
@@ -24,7 +24,7 @@ from dess.scenario.scenario import ScenarioSpace
 from tests.verification import closed_forms
 
 
-class Log(Mission):
+class Log(LoggedMission):
     """A mission whose event log is stored, with what the log says of UAVs and nodes."""
 
     @cached_property
