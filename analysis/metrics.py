@@ -349,10 +349,10 @@ def metric_group(*groups: Group, in_units: bool = False) -> dict[str, Metric]:
         *groups: The groups.
         in_units: Whether those in the units of data sheets are among them.
     """
-    found = {m.column: m for group in groups for m in _ALL if m.group == group}
+    in_groups = {m.column: m for group in groups for m in _ALL if m.group == group}
     if in_units:
-        return found | {metric.in_units.column: metric.in_units for metric in found.values()}
-    return found
+        return in_groups | {m.in_units.column: m.in_units for m in in_groups.values()}
+    return in_groups
 
 
 # The paper's metrics, with their names.

@@ -138,8 +138,8 @@ def unreachable_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
 
 def scenario_notes(spaces: Iterable[ScenarioSpace]) -> list[str]:
     """Which nodes no UAV can serve, and which zones have no room for all UAVs."""
-    known = [*spaces]
-    return [*unreachable_sentences(known), *small_zone_sentences(known)]
+    all_spaces = [*spaces]
+    return [*unreachable_sentences(all_spaces), *small_zone_sentences(all_spaces)]
 
 
 def as_sentences(lines: Iterable[str]) -> list[str]:

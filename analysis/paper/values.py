@@ -100,15 +100,15 @@ def intervals_of_means(
     ratio = printed[RATIO]
     of_product = success * (variance + ratio**2) - (success * ratio) ** 2
     quantile = -float(stdtrit(missions - 1, (1 - LEVEL) / 2))
-    found = exact(printed)
-    found[SUCCESS] = interval_of_share(success, missions)
+    intervals = exact(printed)
+    intervals[SUCCESS] = interval_of_share(success, missions)
     for metric, spread in ((RATIO, variance), (PRODUCT, of_product)):
         half = quantile * (spread / missions) ** 0.5
         if half > 0:
-            found[metric] = Interval(
+            intervals[metric] = Interval(
                 printed[metric], printed[metric] - half, printed[metric] + half
             )
-    return found
+    return intervals
 
 
 def setting_in_symbols(results: Results, point: int) -> dict[str, str]:

@@ -18,8 +18,8 @@ def command_line(*words: object, **options: Any) -> str:
             value, one that is a list is repeated, and one that is a mapping is repeated with
             ``KEY=VALUE``.
     """
-    told = [word for name, value in options.items() for word in _option(f"--{name}", value)]
-    return shlex.join(["dess", *map(str, words), *told])
+    option_words = [word for name, value in options.items() for word in _option(f"--{name}", value)]
+    return shlex.join(["dess", *map(str, words), *option_words])
 
 
 def _option(name: str, value: Any) -> Iterator[str]:

@@ -243,10 +243,10 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False, nodes: in
 
 def empty_records_of(spaces: Iterable[ScenarioSpace], missions: int) -> Records:
     """``empty_records`` for missions of some scenarios."""
-    known = [*spaces]
-    fleet = max((space.uavs[1] for space in known), default=0)
-    nodes = max((len(space.nodes) for space in known if space.units), default=0)
-    return empty_records(missions, fleet, any(space.is_extended for space in known), nodes)
+    all_spaces = [*spaces]
+    fleet = max((space.uavs[1] for space in all_spaces), default=0)
+    nodes = max((len(space.nodes) for space in all_spaces if space.units), default=0)
+    return empty_records(missions, fleet, any(space.is_extended for space in all_spaces), nodes)
 
 
 @dataclass(frozen=True)

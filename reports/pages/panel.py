@@ -283,6 +283,7 @@ def make_panel(
     scenario: str,
     policies: Sequence[str],
     seed: int,
+    *,
     costs: Costs | None = None,
     requirements: Sequence[Requirement] = (),
     varied: Mapping[str, Sequence[Any]] = MappingProxyType({}),

@@ -247,7 +247,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         metric: The metric that ranks the settings, if it is not that of the study.
     """
     point, policy = 0, results.policies[0]
-    found = None
+    shown_search = None
     rule = results.study.selection
     if isinstance(rule, Cheapest):
         search = search_of(results)
@@ -255,7 +255,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         fleet = ""
         if search.best.points:
             fleet = search.best.fleet
-        found = Search(
+        shown_search = Search(
             policy=policy,
             fleet=fleet,
             tolerance=rule.tolerance,
@@ -266,9 +266,18 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         point, policy = int(best.point), best.policy
     space, manifest = results.scenario(point), results.store.manifest
     name = manifest.points[point].values.get(SEA, results.study.scenario)
-    about = results.study.costs, requirements_of(results), varied_values(results)
-    given = results.given_values(point)
-    return make_panel(space, space, name, [policy], manifest.seed, *about, given, found)
+    return make_panel(
+        space,
+        space,
+        name,
+        [policy],
+        manifest.seed,
+        costs=results.study.costs,
+        requirements=requirements_of(results),
+        varied=varied_values(results),
+        given=results.given_values(point),
+        search=shown_search,
+    )
 
 
 def draw_typical_mission(results: Results) -> list[Drawing]:

@@ -158,14 +158,14 @@ def _others_in_words(results: Results, others: pd.DataFrame, what: str) -> str:
         f"{verb_of_seen} worse in what was seen, where {NOT_RULED_OUT}": seen,
         f"{verb} {worse}": int((others["standing"] == WORSE).sum()),
     }
-    found = {words: count for words, count in counts.items() if count}
-    if not found:
+    non_empty = {words: count for words, count in counts.items() if count}
+    if not non_empty:
         return ""
     if len(others) == 1:
-        return f"The other {what} {next(iter(found))}."
-    if len(found) == 1:
-        return f"All {len(others):,} others {next(iter(found))}."
-    *first, last = [f"{count:,} {words}" for words, count in found.items()]
+        return f"The other {what} {next(iter(non_empty))}."
+    if len(non_empty) == 1:
+        return f"All {len(others):,} others {next(iter(non_empty))}."
+    *first, last = [f"{count:,} {words}" for words, count in non_empty.items()]
     if counts[f"{verb} {worse}"]:
         last = f"the rest are {worse}"
     return f"Of the {len(others):,} others, {'; '.join([*first, last])}."

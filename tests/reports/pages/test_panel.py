@@ -69,7 +69,7 @@ def panel() -> str:
     baseline, variation = (load_scenario("paper", uavs=uavs) for uavs in (1, 2))
     costs = Costs(uav=1000, pad=300, charge=40)
     panel = make_panel(
-        baseline, variation, "paper", ["planner", "greedy"], SEED, costs, given={"uavs": 1}
+        baseline, variation, "paper", ["planner", "greedy"], SEED, costs=costs, given={"uavs": 1}
     )
     return str(panel.data)
 
@@ -150,7 +150,7 @@ def test_rates_of_nodes_are_told_as_shares_of_those_of_the_sheet():
 def test_the_prices_of_a_year_can_be_changed():
     space = load_scenario("paper", uavs=2)
     costs = Costs(uav=1000, years=5, interest=0.04, days=250, pack=350)
-    panel = str(make_panel(space, space, "paper", ["greedy"], SEED, costs).data)
+    panel = str(make_panel(space, space, "paper", ["greedy"], SEED, costs=costs).data)
     assert {"days", "pack", "pack_cycles"} <= {*re.findall('name="price-([a-z_]+)"', panel)}
     assert "UAVs and pads are paid off over 5 years at 4 % interest" in panel
     assert '"unit": "EUR a year"' in panel
@@ -161,8 +161,9 @@ def test_the_grid_says_whose_answer_the_page_has(policy):
     """Where the panel cannot simulate its policy, and why the grid may have another one."""
     space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
     search = Search(policy=policy, fleet="3 UAVs, 2 pads", tolerance=0.01, indifference=500)
-    about = Costs(uav=1000), [required], {"uavs": [1, 2], "pads": [1]}, {}, search
-    panel = str(make_panel(space, space, "paper", [policy], SEED, *about).data)
+    about = {"costs": Costs(uav=1000), "requirements": [required], "search": search}
+    varied = {"uavs": [1, 2], "pads": [1]}
+    panel = str(make_panel(space, space, "paper", [policy], SEED, varied=varied, **about).data)
     assert f"The answer of the page is 3 UAVs, 2 pads with {policy}" in panel
     assert ("which this page cannot simulate" in panel) == (policy == "planner")
     assert '"tolerance": 0.01' in panel and '"indifference": 500' in panel
@@ -207,10 +208,14 @@ def test_a_panel_says_that_it_has_no_requirements_of_the_worst_node():
     """A fleet that keeps only the others would be called right."""
     space = load_scenario("jade-bight")
     required = [Requirement(metric_of(name), 0.5) for name in ("success", "least")]
-    panel = str(make_panel(space, space, "jade-bight", ["greedy"], SEED, None, required).data)
+    panel = str(
+        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required).data
+    )
     assert "since it does not know what is collected of each node" in panel
     assert '<option value="success" selected>' not in panel
-    panel = str(make_panel(space, space, "jade-bight", ["greedy"], SEED, None, required[:1]).data)
+    panel = str(
+        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required[:1]).data
+    )
     assert '<option value="success" selected>' in panel
 
 
@@ -371,7 +376,7 @@ def test_what_is_neither_better_nor_worse_is_not_called_so(visit, tmp_path):
         load_scenario("paper", uavs=uavs, pads=2, charging={"measured": True}) for uavs in (1, 3)
     )
     costs = Costs(uav=1000, charge=40, years=5, interest=0.04, days=250, pack=350)
-    panel = make_panel(baseline, variation, "paper", ["greedy"], SEED, costs)
+    panel = make_panel(baseline, variation, "paper", ["greedy"], SEED, costs=costs)
     shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
     path = tmp_path / "page.html"
     path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
@@ -558,8 +563,9 @@ def searched(tmp_path_factory) -> Path:
     space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
     fleets = {"uavs": [1, 2], "pads": [1, 4]}
     costs = Costs(uav=1000, pad=300)
-    about = costs, [required], fleets, {"uavs": 2, "pads": 1}
-    panel = make_panel(space, space, "paper", ["greedy"], SEED, *about)
+    about = {"costs": costs, "requirements": [required], "varied": fleets}
+    given = {"uavs": 2, "pads": 1}
+    panel = make_panel(space, space, "paper", ["greedy"], SEED, given=given, **about)
     shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
     path = tmp_path_factory.mktemp("panel") / "page.html"
     path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
