@@ -29,7 +29,7 @@ from dess.reports.pages.panel import Panel
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile
 from dess.scenario.own_sea import ZonePlace
-from dess.scenario.places import Features, _Plan
+from dess.scenario.places import Features, _PlanDocument
 from dess.scenario.scenario import Scenario, ScenarioSpace, validated
 from tests.test_architecture import FLOORS, SOURCES
 
@@ -95,7 +95,7 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield About, {"module": "", "code": "", "built_with": {"numba": "1"}}
     circle = {"circle": {"center": [1.0, 2.0], "radius": 9.0}, "inclusion": False}
     polygon = {"polygon": [[1.0, 2.0], [1.0, 3.0], [2.0, 2.0]], "inclusion": True}
-    yield _Plan, {"geoFence": {"polygons": [polygon], "circles": [circle]}}
+    yield _PlanDocument, {"geoFence": {"polygons": [polygon], "circles": [circle]}}
     geometries = {"type": "GeometryCollection", "geometries": [point]}
     yield Features, {"features": [{"geometry": geometries}]}
 

@@ -126,7 +126,8 @@ def _match_cells(mission, uavs, zone, chart, turns, closed, reach):
             if len(closed) > 0:
                 way = length_around(chart.zones, chart.ways, chart.rows, closed, u.x, u.y, x, y)
             spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, way, reach)
-            prices[j, place] = min(spent, _LACKING) ** 2
+            bounded = min(spent, _LACKING)
+            prices[j, place] = bounded * bounded
             if spent + waiting_slot(mission) > usable_battery(mission, u):
                 prices[j, place] += _UNREACHABLE
         places[j] = np.argmin(prices[j])
