@@ -76,6 +76,14 @@ def parking_cell(mission, uavs, i, chart, data=1e6):
     return _parking_cell(mission, uavs, i, data, chart, memory, reach)
 
 
+def planned_cells(mission, uavs, i, chart, data=1e6):
+    """The cells that teammates choose before UAV ``i`` in its plan; None where one chooses none."""
+    reach = Ways(np.array([mission]), chart).reach
+    memory = parking.parking_memory(chart, len(uavs))
+    _parking_cell(mission, uavs, i, data, chart, memory, reach)
+    return [tuple(chart.parking[number]) if number >= 0 else None for number in memory.planned]
+
+
 @kernel
 def _parking_cell(mission, uavs, i, data, chart, memory, reach):
     return parking.parking_cell(mission, uavs, i, data, chart, memory, reach)

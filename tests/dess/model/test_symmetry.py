@@ -91,8 +91,18 @@ def _homes(sea: Sea) -> list[tuple[int, ...]]:
     return [tuple(compiled.parking_cell(mission, team, i, chart, data)) for i in sea.view.uav]
 
 
+def _cells_of_teammates(sea: Sea) -> list[tuple[int, int] | None]:
+    """The cells that the plan of each UAV has for its teammates, which it does not take."""
+    mission, team, chart = sea.state.missions[0], sea.state.uavs[0], sea.space.chart
+    data = sea.state.residual[0].sum()
+    plans = [compiled.planned_cells(mission, team, i, chart, data) for i in sea.view.uav]
+    return [cell for plan in plans for cell in plan]
+
+
 def _decides_alike(plain: Sea, turned: Sea, turn: Turn) -> bool:
     """Whether all UAVs charge at the same cells of a turned sea: no tie was decided otherwise.
+
+    Nor may a tie have been decided otherwise in the plan that a UAV has of its teammates.
 
     Where no UAV has to wait for a pad, the one with the lowest battery chooses first, so its way is
     the same whatever it chooses. Otherwise the one that can ask soonest does.
@@ -101,6 +111,9 @@ def _decides_alike(plain: Sea, turned: Sea, turn: Turn) -> bool:
     if not plain.space.zones and plain.space.charging_pads >= plain.space.uavs[1]:
         first = int(np.argmin([plain.state.uavs[0][i]["battery"] for i in plain.view.uav]))
         assert homes[first][2] == others[first][2]
+    cells = [cell and turn.cell(*cell) for cell in _cells_of_teammates(plain)]
+    if cells != _cells_of_teammates(turned):
+        return False
     return [(*turn.cell(x, y), *rest) for x, y, *rest in homes] == others
 
 
