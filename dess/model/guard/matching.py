@@ -100,7 +100,7 @@ def _price(mission, u, spent, slots):
 
 @shared_kernel
 def _match_cells(mission, uavs, zone, chart, turns, closed, reach):
-    """Match the UAVs that come to a small zone to its cells.
+    """Match the UAVs that come to a full zone to its cells.
 
     The sum of the squares of their ways is the least possible, so that of two UAVs on one line the
     first flies on to the deeper cell. It falls with each cell that UAVs fly on their ways, so that
