@@ -11,14 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import (
-    late_slots,
-    margin,
-    margin_slots,
-    slots_needed,
-    usable_battery,
-    waiting_slot,
-)
+from dess.model.guard.battery import late_slots, margin, margin_slots, slots_needed, usable_battery
 from dess.model.guard.moves import contest, contests, guide_uav
 from dess.model.guard.parking import parking_memory
 from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
@@ -27,7 +20,7 @@ from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
-from dess.physics.energy import has_costs
+from dess.physics.energy import has_costs, waiting_slot
 from dess.physics.landing import flies
 
 # The numbers of the policies in compiled code.
@@ -253,23 +246,25 @@ def _choose_goal(
             continue
         x, y = nodes[k, 0], nodes[k, 1]
         slots = _slots_to_cell(u, chart, x, y)
-        spent = slots
-        if charge:
-            spent = round_trip(mission, u, chart, x, y, home, reach)
-        if spent > spare or (charge and _is_too_late(mission, u, chart, x, y)):
-            continue
         if kind == NEAREST:
             score = 1.0 / (slots + _SLOTS_AT_NODE)
         elif kind == GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == AGE:
-            score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
+            score = math.inf  # it takes long, so it is found only for nodes within reach
         elif u.quota == 0:
             score = _score_by_turn(mission, i, data[k], sensors[k], circuit[k])
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if score <= best:  # the weights below are at most 1
             continue
+        spent = slots
+        if charge:
+            spent = round_trip(mission, u, chart, x, y, home, reach)
+        if spent > spare or (charge and _is_too_late(mission, u, chart, x, y)):
+            continue
+        if kind == AGE:
+            score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
         if kind in (GREEDY, AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             score *= _SHARED
         if kind != AGE and data[k] < worth and not (kind == TOUR and u.quota == 0):
@@ -292,10 +287,8 @@ def _is_too_late(mission, u, chart, x, y):
 @inlined
 def _score_by_age(mission, data, sensors, nodes, chart, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
-    score_of_node, beyond = (
-        0.0,
-        0,
-    )  # an integer, since a sum of floats depends on the order of the nodes
+    score_of_node = 0.0
+    beyond = 0  # an integer, since a sum of floats depends on the order of the nodes
     for other in range(len(nodes)):
         if data[other] > 0.0:
             age = mission.slot + 1 - sensors[other].newest  # at the end of this slot

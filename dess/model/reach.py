@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.model.channel import mean_snr_at
-from dess.model.guard.battery import margin, waiting_slot
+from dess.model.guard.battery import margin
 from dess.model.state import constants_of, types_of
 from dess.model.ways import FAR as WAYS_FAR
 from dess.model.ways import move_costs, relax
 from dess.physics import fleet
 from dess.physics.chart import FAR, parking_of, read_only, spread, zones_of
-from dess.physics.energy import ACTIONS, HOVERING, PERCENT
+from dess.physics.energy import ACTIONS, HOVERING, PERCENT, waiting_slot
 from dess.scenario.scenario import ScenarioSpace
 
 

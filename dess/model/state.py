@@ -149,18 +149,18 @@ UAV = np.dtype(
 )
 
 
-# One sensor node, beyond its residual data.
+# One sensor node, beyond its residual data; without sections, it has the first fields alone.
+_SENSOR_FIELDS = [
+    ("newest", np.float64),  # from when the newest data are that were collected [slots]
+    ("silent", np.bool_),
+    ("hidden", np.float64),  # its data while it is silent [data units]
+    ("rate", np.float64),  # its arrival rate, where nodes have their own
+]
+PLAIN_SENSOR = np.dtype(_SENSOR_FIELDS, align=True)
+# With sections also: its data [data units], and the area below its age until the newest of its data
+# was collected [slots^2].
 SENSOR = np.dtype(
-    [
-        ("newest", np.float64),  # from when the newest data are that were collected [slots]
-        ("silent", np.bool_),
-        ("hidden", np.float64),  # its data while it is silent [data units]
-        ("rate", np.float64),  # its arrival rate, where nodes have their own
-        # Where the scenario has sections: its data [data units], and the area below its age until
-        # the newest of its data was collected [slots^2].
-        *fields(np.float64, "initial arrived collected age_area"),
-    ],
-    align=True,
+    [*_SENSOR_FIELDS, *fields(np.float64, "initial arrived collected age_area")], align=True
 )
 
 
@@ -171,7 +171,7 @@ class State(NamedTuple):
         missions: (B,) ``MISSION`` records.
         uavs: (B, I) ``UAV`` records.
         residual: (B, K) residual data [data units].
-        sensors: (B, K) ``SENSOR`` records.
+        sensors: (B, K) ``SENSOR`` or ``PLAIN_SENSOR`` records.
         teeth: (B, G) where ages are measured, the number of their teeth by length in communication
             slots (``dess.physics.age``); otherwise (B, 0).
     """
@@ -186,11 +186,13 @@ class State(NamedTuple):
 def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
     """A state filled with zeros, for that many missions of scenarios with the same nodes."""
     fleet, nodes = max(space.uavs[1] for space in spaces), len(spaces[0].nodes)
+    mission = _constants_of(spaces[0]).dtype
+    sensor = PLAIN_SENSOR if mission == PLAIN_MISSION else SENSOR
     return State(
-        np.zeros(missions, _constants_of(spaces[0]).dtype),
+        np.zeros(missions, mission),
         np.zeros((missions, fleet), UAV),
         np.zeros((missions, nodes)),
-        np.zeros((missions, nodes), SENSOR),
+        np.zeros((missions, nodes), sensor),
         np.zeros((missions, teeth_lengths(spaces)), np.int32),
     )
 

@@ -205,6 +205,28 @@ def has_costs(mission):
 
 
 @inlined
+def dearest_slot(mission):
+    """The most that a slot takes [% / 1000]."""
+    return PERCENT + _more_at_most(mission)
+
+
+@for_sections
+def _more_at_most(mission):
+    return mission.dearest_slot - PERCENT
+
+
+@inlined
+def waiting_slot(mission):
+    """The battery that the return guard counts for a slot of waiting [% / 1000]."""
+    return PERCENT + _more_of_waiting(mission)
+
+
+@for_sections
+def _more_of_waiting(mission):
+    return mission.waiting_slot - PERCENT
+
+
+@inlined
 def slot_cost(mission, slots_per_cell, action):
     """The battery that a slot takes without gusts [% / 1000].
 

@@ -22,16 +22,19 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.guard.battery import (
-    MARGIN_PER_TEAMMATE,
-    SCARCE_SLOTS,
-    waiting_slot,
-)
+from dess.model.guard.battery import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.model.guard.ways import battery_of_flight
 from dess.model.state import HOVER, STEP_X, STEP_Y, fields
 from dess.physics.charging import charge_limit, gain
 from dess.physics.chart import distance, in_zone, is_open
-from dess.physics.energy import PERCENT, has_costs, slot_cost_at, thousandths_left
+from dess.physics.energy import (
+    PERCENT,
+    dearest_slot,
+    has_costs,
+    slot_cost_at,
+    thousandths_left,
+    waiting_slot,
+)
 from dess.physics.failures import working_pads
 from dess.physics.fleet import leg
 from dess.physics.landing import has_finished, lands, next_latch
@@ -574,7 +577,7 @@ def _must_return(mission, rates, v, t, active):
     kept = v.slots_per_cell + 2 + _slots_for_detours(mission, v, active)
     if has_costs(mission):
         spent = _battery_to_cell(mission, rates.chart, v, home[0], home[1])
-        spent += mission.flight_cost * kept * mission.dearest_slot
+        spent += mission.flight_cost * kept * dearest_slot(mission)
         return way + kept > left or spent > v.battery
     if mission.flight_cost > 0:
         left = min(left, _percent_left(mission, v))

@@ -12,7 +12,14 @@ import math
 from dess.base.kernels import inlined
 from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
 from dess.physics.charging import own_limit
-from dess.physics.energy import PERCENT, has_costs, slot_cost, thousandths_left
+from dess.physics.energy import (
+    PERCENT,
+    dearest_slot,
+    has_costs,
+    slot_cost,
+    thousandths_left,
+    waiting_slot,
+)
 from dess.physics.failures import working_pads
 from dess.physics.landing import flies, lands
 from dess.physics.radio import has_limit
@@ -106,7 +113,7 @@ def must_charge(mission, u, data):
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
-    return thousandths_left(u) < mission.flight_cost * mission.dearest_slot * needed
+    return thousandths_left(u) < mission.flight_cost * dearest_slot(mission) * needed
 
 
 @inlined
@@ -115,12 +122,6 @@ def will_charge(mission, u):
     least = waiting_slot(mission) * slots_needed(mission, u)
     needs = thousandths_left(u) < mission.flight_cost * least
     return flies(u) and (needs or lands(mission) or has_limit(mission))
-
-
-@inlined
-def waiting_slot(mission):
-    """The battery that a slot of waiting counts [% / 1000]."""
-    return mission.waiting_slot
 
 
 @inlined
@@ -194,7 +195,7 @@ def _slot_of_detour(mission, u):
     if not has_costs(mission):
         return PERCENT
     if mission.gusts > 0.0:  # the gusts of two cells are hardly ever both the strongest
-        return (PERCENT + mission.dearest_slot + 1) // 2
+        return (PERCENT + dearest_slot(mission) + 1) // 2
     slots = u.slots_per_cell
     across = slot_cost(mission, slots, NORTH) + slot_cost(mission, slots, SOUTH)
     along = slot_cost(mission, slots, EAST) + slot_cost(mission, slots, WEST)

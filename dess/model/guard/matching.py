@@ -16,11 +16,12 @@ Where UAVs take turns at pads, the plan of pads (``dess.model.guard.queues``) te
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import late_slots, margin, margin_slots, usable_battery, waiting_slot
+from dess.model.guard.battery import late_slots, margin, margin_slots, usable_battery
 from dess.model.guard.queues import find_ways, is_given_up, needs_pad
 from dess.model.guard.ways import battery_of_way, is_parked
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics.chart import distance, is_open, length_around
+from dess.physics.energy import waiting_slot
 from dess.physics.landing import lands
 
 # The price of a way home is the battery that it takes, and more for each unit that lacks for it and

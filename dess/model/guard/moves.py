@@ -11,7 +11,6 @@ from dess.model.guard.battery import (
     margin_slots,
     must_charge,
     usable_battery,
-    waiting_slot,
     will_charge,
 )
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
@@ -30,7 +29,7 @@ from dess.model.view import View
 from dess.model.ways import is_calm
 from dess.physics.charging import longest_charge
 from dess.physics.chart import Chart, distance, in_zone, is_open
-from dess.physics.energy import PERCENT, has_costs, move_cost, slot_cost
+from dess.physics.energy import PERCENT, dearest_slot, has_costs, move_cost, slot_cost, waiting_slot
 from dess.physics.landing import lands
 
 _MOST_BATTERY = 2**40  # more than any way costs
@@ -308,7 +307,7 @@ def _wait(mission, u, chart, action, x, y, home):
         return 0
     battery = (home.begins - arrives) * waiting_slot(mission)
     if has_costs(mission):
-        battery += 2 * mission.dearest_slot
+        battery += 2 * dearest_slot(mission)
     return battery
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import late_slots, usable_battery, waiting_slot
+from dess.model.guard.battery import late_slots, usable_battery
 from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     KEPT,
@@ -26,6 +26,7 @@ from dess.model.guard.ways import (
 )
 from dess.model.ways import is_calm
 from dess.physics.chart import distance
+from dess.physics.energy import waiting_slot
 from dess.physics.landing import lands
 from dess.scenario.fields import MOST_ZONES
 
@@ -126,19 +127,20 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
-    if not may_wait(mission, uavs, data):
-        if not is_tight(mission, chart):
-            return _choose(mission, uavs, i, chart, memory, reach)
+    wait = begins = gives_way = np.int64(0)
+    is_planned = may_wait(mission, uavs, data)
+    is_matched = not is_planned and is_tight(mission, chart)
+    if is_planned:
+        for zone in range(mission.zones):
+            memory.plan.queues[zone].is_full = 0
+        wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
+    elif is_matched:
         match_zones(mission, uavs, data, chart, memory.plan, reach)
-        home = _choose(mission, uavs, i, chart, memory, reach)
+    home = _choose(mission, uavs, i, chart, memory, reach)
+    if is_matched:
         wait = _slots_for_others(mission, uavs, i, memory.plan.turns)
         zone = memory.plan.turns[i].zone
         gives_way = np.int64(_leaves_cell(mission, uavs[i], zone, home, memory.plan))
-        return Home(home.x, home.y, home.cells, wait, home.begins, gives_way)
-    for zone in range(mission.zones):
-        memory.plan.queues[zone].is_full = 0
-    wait, begins, gives_way = plan_pads(mission, uavs, i, data, chart, memory.plan, reach)
-    home = _choose(mission, uavs, i, chart, memory, reach)
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
 
 
@@ -213,7 +215,7 @@ def _chooses_before(uavs, j, other, turns):
     return uavs[j].battery < uavs[other].battery
 
 
-@shared_kernel
+@inlined
 def _choose(mission, uavs, i, chart, memory, reach):
     """The cell of UAV ``i``: of those that no teammate takes, the one that takes least battery.
 
@@ -254,12 +256,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
-        cell, cells = turns[j].cell, np.int64(0)
-        if cell >= 0:
-            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-            cells = path_length(mission, uavs, j, chart, None, o.x, o.y, x, y)
-        else:
-            cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
+        cell, cells = _soonest_free(mission, uavs, j, chart, memory, reach)
         if j == i:
             if cell < 0:
                 break
@@ -282,20 +279,25 @@ def _has_cell(mission, u, are_matched):
 def _soonest_free(mission, uavs, i, chart, memory, reach):
     """The number of the best parking cell that is not taken (-1 if none), and the way to it.
 
-    It is in the zone that the plan of pads tells, unless this is full. A mission may end on the
-    ground before a teammate has left its cell, so there a UAV counts on the cells of teammates only
-    if no other is in reach.
+    It is the one that the UAV is matched to, if there is one. Otherwise it is in the zone that the
+    plan of pads tells, unless this is full. A mission may end on the ground before a teammate has
+    left its cell, so there a UAV counts on the cells of teammates only if no other is in reach.
     """
     u, zone = uavs[i], memory.plan.turns[i].zone
     most = _FREE if lands(mission) else _OCCUPIED
     # The nearest cell of all is free most of the time, so this one is tried first.
-    cell = np.int64(chart.nearest[u.y, u.x])
+    cell = np.int64(memory.plan.turns[i].cell)
+    is_matched = cell >= 0
+    if not is_matched:
+        cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     cells, nearest_zone = distance(chart, u.x, u.y, x, y), np.int64(chart.zones[y, x])
     free = (cells == 0 or memory.taken[cell] <= most) and not is_given_up(mission, nearest_zone)
     free = free and is_calm(reach) and (zone < 0 or zone == nearest_zone)
-    if free and path_length(mission, uavs, i, chart, None, u.x, u.y, x, y) == cells:
-        return cell, cells
+    if is_matched or free:
+        way = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
+        if is_matched or way == cells:
+            return cell, way
     cell, cells, spent = _best_cell(mission, uavs, i, zone, most, chart, memory, reach)
     is_in_reach = cell >= 0 and (not lands(mission) or spent < usable_battery(mission, u))
     is_in_reach = is_in_reach and late_slots(mission, cells * u.slots_per_cell + 1) == 0

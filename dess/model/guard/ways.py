@@ -5,12 +5,12 @@ import heapq
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import cannot_leave, ends_soon, usable_battery, waiting_slot
+from dess.model.guard.battery import cannot_leave, ends_soon, usable_battery
 from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
 from dess.model.ways import FAR, is_calm
 from dess.physics.charging import longest_charge
 from dess.physics.chart import distance, is_open, length_around
-from dess.physics.energy import PERCENT, has_costs, move_cost, slot_cost
+from dess.physics.energy import PERCENT, dearest_slot, has_costs, move_cost, slot_cost, waiting_slot
 from dess.physics.landing import lands
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
@@ -55,14 +55,15 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
     length, between, beside = distance(chart, x, y, to_x, to_y), 0, 0
     for j in range(mission.uavs):
         closed_x, closed_y = _closed(mission, uavs, i, j, chart, planned)
+        if closed_x < 0:
+            continue
         is_there = closed_x == to_x and closed_y == to_y
         if is_there and (planned is not None or is_tight(mission, chart)):
             continue  # it leaves the cell, or the UAV waits there for its turn in it
-        if closed_x >= 0:
-            before = distance(chart, x, y, closed_x, closed_y)
-            more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length
-            between += more == 0
-            beside += more == 2  # it may close the way around the one between
+        before = distance(chart, x, y, closed_x, closed_y)
+        more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length
+        between += more == 0
+        beside += more == 2  # it may close the way around the one between
     if between == 0:
         return length
     is_line = x == to_x or y == to_y
@@ -204,7 +205,7 @@ def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery for a way home of so many cells, those of a detour included [% / 1000]."""
     if reach is None or len(reach) == 0:
         return PERCENT * cells
-    dearest = u.slots_per_cell * mission.dearest_slot
+    dearest = u.slots_per_cell * dearest_slot(mission)
     if reach.size == 0:  # too many cells for a table
         return cells * dearest
     detour = cells - distance(chart, x, y, home_x, home_y)
@@ -242,7 +243,7 @@ def battery_of_flight(mission, slots, east, south, cells):
     """
     along_x = slot_cost(mission, slots, EAST if east > 0 else WEST)
     along_y = slot_cost(mission, slots, SOUTH if south > 0 else NORTH)
-    detour = (cells - abs(east) - abs(south)) * mission.dearest_slot
+    detour = (cells - abs(east) - abs(south)) * dearest_slot(mission)
     return slots * (abs(east) * along_x + abs(south) * along_y + detour)
 
 
