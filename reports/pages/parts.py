@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from IPython.display import HTML, Markdown, display
+from markupsafe import Markup
 
 from dess.analysis.facts import Fact
 from dess.analysis.tables import Table
@@ -59,9 +60,12 @@ def make_answer(sentence: str, number: str = "") -> Part:
 
 
 def make_facts(facts: Iterable[Fact]) -> HTML:
-    """The facts of an answer as a table."""
+    """The facts of an answer as a table, with links that save it."""
     shown = [*facts]
-    return render_part("facts.html", facts=shown, is_required=any(f.required for f in shown))
+    frame = pd.DataFrame(shown)
+    links = Markup(make_download_links("The answer in facts", frame, frame))
+    is_required = any(fact.required for fact in shown)
+    return render_part("facts.html", facts=shown, is_required=is_required, links=links)
 
 
 def make_assumptions(facts: Iterable[Fact]) -> HTML:
