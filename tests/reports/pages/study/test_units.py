@@ -12,7 +12,7 @@ from tests.reports.small import said_by, words_of
 
 A4 = 182, 269  # less the margins [mm]
 PIXEL = 25.4 / 96  # [mm]
-SHEET_OF_PAPER = ("h1", "figure.lead", "main > .gallery", ".facts", ".assumptions")
+SHEET_OF_PAPER = ("h1", "figure.lead", ".facts", "main > .gallery", ".assumptions")
 
 
 def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
