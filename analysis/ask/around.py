@@ -59,7 +59,9 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
     best = search_of(results).best
     manifest = results.store.manifest
     points = best.points
-    if not points or not results.scenario(points[-1]).units or is_path(best.policy):
+    if manifest.processes or not points or is_path(best.policy):
+        return None
+    if not results.scenario(points[-1]).units:
         return None
     fixed = manifest.study.set
     values = manifest.points[points[-1]].values

@@ -9,7 +9,7 @@ from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import as_sentences, battery_sentence, scenario_notes, type_sentences
 from dess.physics.fleet import IN_UNITS
-from dess.scenario.data_sheet import LORA, DataSheet
+from dess.scenario.data_sheet import LORA, DataSheet, lora
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 
@@ -122,8 +122,9 @@ def _lora_rates_of(sheet: DataSheet) -> str:
         return (
             f"the rates of LoRa in packets of {sheet.packet}, their preambles and headers counted"
         )
-    fast = f"{sheet.lorawan_overhead(7):.2f} times as long with spreading factor 7"
-    slow = f"{sheet.lorawan_overhead(12):.2f} times with 12"
+    bandwidth = sheet.number("bandwidth")
+    fast = f"{lora.lorawan_overhead(7, bandwidth):.2f} times as long with spreading factor 7"
+    slow = f"{lora.lorawan_overhead(12, bandwidth):.2f} times with 12"
     overhead = f"with which a full LoRaWAN packet takes {fast} and {slow}"
     return f"the rates of LoRa without preambles and headers, {overhead}"
 

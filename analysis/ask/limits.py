@@ -247,6 +247,8 @@ def find_limits(
     path = place_of_limits(results)
     if not best.points or is_path(best.policy) or results.checks.empty or path.exists():
         return
+    if results.store.manifest.processes:
+        return
     fleet = _Fleet(results, scenario, workers, progress, missions)
     if not fleet.space.units or fleet.space.needs_events:
         return

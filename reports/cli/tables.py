@@ -39,6 +39,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     study = results.study
     missions = numbers.format_count(len(results.missions), "mission")
     console.print_text(f"{folder}: {missions} of study {study.name}")
+    if results.store.manifest.processes:
+        console.print_text(f" with {results.store.manifest.functions}, in the SimPy engine")
     for change in results.store.manifest.accepted:
         console.print_text(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})

@@ -246,6 +246,9 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         results: The study.
         metric: The metric that ranks the settings, if it is not that of the study.
     """
+    manifest = results.store.manifest
+    if manifest.processes:
+        return Markdown(f"A page cannot simulate {manifest.functions}, which is Python.")
     point, policy = 0, results.policies[0]
     shown_search = None
     rule = results.study.selection
@@ -264,7 +267,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     elif results.design != "saltelli":
         best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
         point, policy = int(best.point), best.policy
-    space, manifest = results.scenario(point), results.store.manifest
+    space = results.scenario(point)
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     return make_panel(
         space,
@@ -283,15 +286,15 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
 def draw_typical_mission(results: Results) -> list[Drawing]:
     """The map of a typical mission of the cheapest fleet, with the names of its nodes.
 
-    It is the mission with the median of what decides the search. None is drawn if the policy is a
-    Python file, which may be anybody's code.
+    It is the mission with the median of what decides the search. None is drawn if the policy or a
+    process is a Python file, which may be anybody's code.
 
     Args:
         results: A study that searches for the cheapest fleet.
     """
     search = search_of(results)
     policy = search.best.policy
-    if is_path(policy):
+    if is_path(policy) or results.store.manifest.processes:
         return []
     column = search.deciding_requirement()[0].column
     replication = typical_replication(search.shown_missions, column)
