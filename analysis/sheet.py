@@ -141,11 +141,6 @@ def scenario_notes(spaces: Iterable[ScenarioSpace]) -> list[str]:
     return [*unreachable_sentences(all_spaces), *small_zone_sentences(all_spaces)]
 
 
-def as_sentences(lines: Iterable[str]) -> list[str]:
-    """Lines with a capital at their beginning and a full stop at their end."""
-    return [f"{line[0].upper()}{line[1:]}." for line in lines]
-
-
 def small_zone_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
     """Which zones have too few cells for the largest fleet of scenarios, so that UAVs may be lost.
 

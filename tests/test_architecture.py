@@ -38,7 +38,8 @@ ROOMS = {
         "registry",
     ),
     "analysis": (
-        *("numbers", "names", "metrics", "sheet", "stats", "tables", "bound", "study", "wasm"),
+        *("numbers", "names", "metrics", "facts", "sheet", "stats", "tables", "bound", "study"),
+        "wasm",
         *("results", "flights", "execution", "figures"),
         *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),

@@ -12,7 +12,6 @@ from IPython.display import HTML, Markdown
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.missions import map_caption, neglected_sentence, typical_replication
 from dess.analysis.answers.settings.baseline import check_baseline
@@ -37,7 +36,6 @@ from dess.reports.pages import PREFIX, notebook
 from dess.reports.pages.markdown import (
     Marked,
     command_block,
-    escape_sentences,
     escape_text,
     fill_markdown,
     format_code,
@@ -151,7 +149,7 @@ def list_guarantees(results: Results) -> Marked:
     lines = [
         fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows
     ]
-    return Marked("\n".join(lines))
+    return Marked("\n".join(dict.fromkeys(lines)))
 
 
 def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
@@ -167,14 +165,6 @@ def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
         folder=format_code(results.usual_folder),
         lines=command_block(missions["command"]),
     )
-
-
-def list_reasons(results: Results) -> Marked:
-    """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
-    search = search_of(results)
-    lines = [f"- {text}" for text in (prices_in_words(results), *search.reason_sentences())]
-    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(search.guarantee_sentences()))
-    return escape_sentences("\n".join(lines) + f"\n\n{sure}")
 
 
 def _describe_design(results: Results) -> Iterator[Marked]:
