@@ -337,7 +337,7 @@ def _check_policies(study: Study) -> None:
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
-    places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
+    places = {(s.geometry, s.nodes): s for s in study.scenarios}
     largest = max(space.uavs[1] for space in places.values())
     teams = _load_teams(study, largest)
     processes = load_processes(study.processes)
