@@ -7,7 +7,7 @@ import numpy as np
 
 from dess.analysis import numbers
 from dess.base.errors import listed
-from dess.model.channel import efficiency, mean_snr_at
+from dess.model.channel import Link, efficiency, mean_snr_at
 from dess.model.reach import Reach, reach_of_nodes
 from dess.model.state import ACTION_NAMES, constants_of
 from dess.physics.arrivals import MOST_MESSAGES
@@ -128,8 +128,7 @@ def unreachable_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
 
     A scenario without limits has none: nothing about it is known to be wrong.
     """
-    distinct = {_reach_key(space): space for space in spaces if space.units}
-    reaches = [(space, reach_of_nodes(space)) for space in distinct.values()]
+    reaches = [(space, reach_of_nodes(space)) for space in spaces if space.units]
     limited = [pair for pair in reaches if _is_short(pair[1])]
     if not limited:
         return []
@@ -140,11 +139,6 @@ def scenario_notes(spaces: Iterable[ScenarioSpace]) -> list[str]:
     """Which nodes no UAV can serve, and which zones have no room for all UAVs."""
     all_spaces = [*spaces]
     return [*unreachable_sentences(all_spaces), *small_zone_sentences(all_spaces)]
-
-
-def as_sentences(lines: Iterable[str]) -> list[str]:
-    """Lines with a capital at their beginning and a full stop at their end."""
-    return [f"{line[0].upper()}{line[1:]}." for line in lines]
 
 
 def small_zone_sentences(spaces: Iterable[ScenarioSpace]) -> list[str]:
@@ -184,12 +178,6 @@ def _lacks_room(space: ScenarioSpace) -> bool:
     return needs_room and sum(_rooms_at_pads(space)) < fleet <= 2 * space.charging_pads
 
 
-def _reach_key(space: ScenarioSpace) -> Any:
-    """What the nodes that UAVs can serve depend on; a sweep has many scenarios that share it."""
-    sea = (space.size, space.rectangles, space.no_fly, space.nodes, space.path_loss_exponent)
-    return (*sea, space.uavs[1], space.fleet, space.charge_complete, space.data_sheet)
-
-
 def _is_short(reach: Reach) -> bool:
     return bool(reach.lost or reach.margins)
 
@@ -225,7 +213,7 @@ def _rates_by_distance(space: ScenarioSpace) -> list[tuple[float, float]]:
     rates = []
     for distance in sorted({max(units.cell, space.altitude), max(far, space.altitude)}):
         horizontal = np.sqrt(distance * distance - space.altitude * space.altitude)
-        snr = float(mean_snr_at(space, np.array([horizontal]))[0])
+        snr = float(mean_snr_at(Link.of(space), np.array([horizontal]))[0])
         rates.append((distance, efficiency(mission, snr) * _bits_per_second(space)))
     return rates
 

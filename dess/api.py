@@ -20,6 +20,7 @@ def simulate(
     replication: int = 0,
     *,
     events: bool = False,
+    processes: Sequence[mission.Process] = (),
 ) -> MissionRecord:
     """Simulate one mission with the SimPy model.
 
@@ -31,17 +32,19 @@ def simulate(
         seed: Seed of the study.
         replication: Number of the replication.
         events: Whether to keep the event log.
+        processes: Further processes, functions of the ``Mission`` that yield SimPy events.
 
     Returns:
         The record of the mission.
 
     Raises:
         InputError: If the seed or the replication is out of range, or if the team has more policies
-            than the largest fleet has UAVs; if there is no scenario or policy of a name.
+            than the largest fleet has UAVs; if there is no scenario or policy of a name, or a
+            process yields nothing.
         ValueError: If a policy does not return actions.
     """
     team = load_policies(policy)
-    return mission.simulate(scenario, team, seed, replication, events=events)
+    return mission.simulate(scenario, team, seed, replication, events=events, processes=processes)
 
 
 def simulate_batch(

@@ -1,8 +1,8 @@
 """What MkDocs builds into the site besides the pages of this folder.
 
 - A line ``<!-- [[ NAME ]] -->`` of a page becomes a part made from the code: the commands, the
-  fields of a scenario, the public names of a package, a process of the SimPy model, the changelog,
-  a section of the README, a rendered report.
+  fields of a scenario, the public names of a package, a process of the SimPy model, an example, the
+  changelog, a section of the README, a rendered report.
 - A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
   that shows this file. So the same link works in the repository and in the site.
 - The reports that ``nox -s reports`` has rendered lie in the site as well; it builds without them,
@@ -83,6 +83,11 @@ def code(process: str) -> str:
     return f"```python\n{dedent(source)}```"
 
 
+def example(name: str) -> str:
+    """A file of ``examples/``."""
+    return f"```python\n{(ROOT / 'examples' / name).with_suffix('.py').read_text('utf-8')}```"
+
+
 def changelog() -> str:
     """The changelog, without its title."""
     return (ROOT / "CHANGELOG.md").read_text("utf-8").split("\n", 1)[1]
@@ -133,7 +138,7 @@ def reports() -> str:
 
 PARTS: dict[str, Callable[..., str]] = {
     part.__name__: part
-    for part in (commands, scenario_fields, names, code, changelog, readme, live, reports)
+    for part in (commands, scenario_fields, names, code, example, changelog, readme, live, reports)
 }
 
 

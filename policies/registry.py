@@ -16,13 +16,10 @@ Other packages register theirs under the entry point ``dess.policies``.
 
 import inspect
 import os
-import re
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from importlib import import_module, invalidate_caches
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points, version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -30,7 +27,7 @@ import numpy as np
 
 from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.base.files.reading import Missing, paths_in, read_text
-from dess.base.sources import path_of
+from dess.base.python_file import PythonName
 from dess.model.view import View
 from dess.policies.learner.config import CHECKPOINT, CONFIG, field_ranges, read_description
 from dess.policies.shipped import HEURISTICS, PLANNERS
@@ -69,11 +66,10 @@ CLASSES = HEURISTICS | PLANNERS  # the shipped policies that are classes
 
 TRAINED = Path(__file__).with_name("trained")  # one folder per trained policy
 
-# A class of a Python file.
-FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
+FORM = "FILE.py:CLASS"
 _ALLOWED = "a class whose objects have a name and act(view)"
 _OTHERS = (
-    "the folder of a trained policy, FILE.py:CLASS, or what an installed package registers under "
+    f"the folder of a trained policy, {FORM}, or what an installed package registers under "
     f"the entry point {GROUP}"
 )
 
@@ -125,18 +121,11 @@ def load(name: str | Path, *, run_files: bool = False) -> Policy:
         if name in trained_names():
             policy.name = name
         return policy
-    if file := FILE.fullmatch(name):
-        if not run_files:
-            raise InputError(
-                "policy",
-                f"{shown(name)} is a Python file, which is run only if you name it",
-                "--policy FILE.py:CLASS, if you trust the file",
-            )
-        path = Path(file["path"])
-        kind = file["kind"]
-        if not os.path.isfile(path):  # False for a name that no file can have
-            raise InputError(f"policy: {path}", "no such file", "FILE.py:CLASS")
-        return _make_policy(kind, str(path), lambda: _find_class(_import_name(path), kind))
+    if file := PythonName.parse(name):
+        file.check("policy", FORM, run_files=run_files)
+        return _make_policy(
+            file.name, str(file.path), lambda: _find_class(file.find_module("policy"), file.name)
+        )
     if point := _registered_policies().get(name):
         return _make_policy(name, point.value, point.load)
     _check_untrained(Path(name))
@@ -207,22 +196,6 @@ def _find_class(module: str, name: str) -> Callable[[], Any]:
     return names_of_module[name]
 
 
-def _import_name(path: Path) -> str:
-    """The name under which a file is imported, once its folder is on ``sys.path``.
-
-    Raises:
-        InputError: If another module has this name.
-    """
-    if (folder := str(path.resolve().parent)) not in sys.path:
-        sys.path.append(folder)
-    invalidate_caches()
-    path_of.cache_clear()
-    spec = find_spec(path.stem)
-    if not spec or not spec.origin or Path(spec.origin).resolve() != path.resolve():
-        raise InputError(f"policy: {path}", "another module has its name", "another file name")
-    return path.stem
-
-
 def load_team(text: str, uavs: int | None = None, *, run_files: bool = False) -> list[Policy]:
     """Load the policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
 
@@ -244,7 +217,7 @@ def python_files_in(team: str) -> list[str]:
     Nothing is imported to find out.
     """
     names = map(str.strip, team.split(","))
-    return [name for name in names if FILE.fullmatch(name) and not folder_of(name)]
+    return [name for name in names if PythonName.parse(name) and not folder_of(name)]
 
 
 def list_teams(teams: Any) -> Any:
@@ -256,7 +229,7 @@ def list_teams(teams: Any) -> Any:
 
 def is_path(name: str) -> bool:
     """Whether a name is a path, so that what it names depends on the working folder."""
-    return name not in names() and bool(FILE.fullmatch(name) or folder_of(name))
+    return name not in names() and bool(PythonName.parse(name) or folder_of(name))
 
 
 def is_confirmed(team: str, named: Iterable[str]) -> bool:
@@ -400,6 +373,6 @@ def _describe_origin(name: str) -> str:
         return f"shipped with dess {version('dess')}"
     if folder := folder_of(name):
         return f"the folder {folder}"
-    if file := FILE.fullmatch(name):
-        return f"the file {file['path']}"
+    if file := PythonName.parse(name):
+        return f"the file {file.path}"
     return f"the package {package_of(name)}"

@@ -27,7 +27,7 @@ ROOMS = {
             "model.reach",
             "model.batch",
         ),
-        "model.mission",
+        *("model.mission", "model.processes"),
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
@@ -38,7 +38,8 @@ ROOMS = {
         "registry",
     ),
     "analysis": (
-        *("numbers", "names", "metrics", "sheet", "stats", "tables", "bound", "study", "wasm"),
+        *("numbers", "names", "metrics", "facts", "sheet", "stats", "tables", "bound", "study"),
+        "wasm",
         *("results", "flights", "execution", "figures"),
         *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),
@@ -74,12 +75,14 @@ DECIDE = {
         f"is_confirmed({name}, sampling.named)" for name in ("name", "policy")
     },
     "dess.reports.cli.simulate": {"True", "bool(named)"},
+    "dess.model.processes": {"isinstance(name, TypedProcess)"},
 }
 # The functions to which users give names, and the modules that use them.
 MAY_RUN_FILES = {
     "dess.policies.load": set(),
     "dess.policies.load_team": {"dess.api"},  # what a user gives as a policy
     "dess.analysis.execution.evaluation.evaluate": {"dess.analysis"},
+    "dess.model.processes.TypedProcess": {"dess.reports.cli.options"},
     **{
         f"dess.analysis.ask.question.{name}_question": {
             *("dess.analysis.ask.answer", "dess.reports.cli.ask"),

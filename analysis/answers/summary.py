@@ -9,7 +9,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.settings.points import ends_of_point, ends_sentence, points_in_words
+from dess.analysis.answers.settings.points import points_in_words
 from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import (
     HOME,
@@ -599,11 +599,10 @@ def selected_settings(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
-        ``left`` (number of points not ruled out), ``guaranteed``, ``guarantee`` in words, with
-        the ends of the values at which the point lies, and the ``metric`` that it is selected by
-        with its ``mean``, ``low`` and ``high`` over the missions of the selection. Empty if the
-        study selects nothing. For a study that selects the cheapest setting, the rows of
-        ``FleetSearch.selected_fleets``.
+        ``left`` (number of points not ruled out), ``guaranteed``, ``guarantee`` in words, and the
+        ``metric`` that it is selected by with its ``mean``, ``low`` and ``high`` over the missions
+        of the selection. Empty if the study selects nothing. For a study that selects the cheapest
+        setting, the rows of ``FleetSearch.selected_fleets``.
     """
     rule = results.study.selection
     if isinstance(rule, Cheapest):
@@ -613,9 +612,7 @@ def selected_settings(results: Results) -> pd.DataFrame:
     for policy in results.policies:
         if (c := results.choice(policy)) is not None:
             selected = (policy, c.best, words[c.best], c.missions, len(c.survivors))
-            lies = ends_sentence(results, c.best, ends_of_point(results, c.best))
-            guarantee = f"{c.guarantee}.{lies}" if lies else c.guarantee
-            rows.append((*selected, c.guaranteed, guarantee))
+            rows.append((*selected, c.guaranteed, c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     table = pd.DataFrame(rows, columns=columns)
     if rule is None:

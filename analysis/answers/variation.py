@@ -1,7 +1,7 @@
 """A variation of a scenario compared with its baseline, on the same missions.
 
     variation = Variation(load_results("results/what-if/HASH"), "greedy")
-    variation.sentence()
+    variation.headline(), variation.facts()
 
 The study has two design points: the baseline, then the variation.
 """
@@ -20,6 +20,7 @@ from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.missions import end_in_words, estimate_metric
 from dess.analysis.answers.settings.home import with_way_home
+from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
     HOME,
     METRICS,
@@ -35,7 +36,6 @@ from dess.analysis.metrics import (
     metric_of,
 )
 from dess.analysis.names import RANGES, described_field, field_in_words, field_named, sum_in_words
-from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.resimulate import resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.differences import add_adjusted, compare
@@ -59,12 +59,14 @@ if TYPE_CHECKING:  # figures need the extra reports
 
 
 BASELINE, VARIATION = 0, 1  # the design points
-# What stands behind a difference that is not shown.
-_DOUBTS = {
-    SEEN_ABOVE: f" (higher in what was seen; {NOT_RULED_OUT})",
-    INCONCLUSIVE: " (inconclusive)",
-    SEEN_BELOW: f" (lower in what was seen; {NOT_RULED_OUT})",
+_VERDICTS = {
+    ABOVE: "higher",
+    SEEN_ABOVE: f"higher in what was seen, where {NOT_RULED_OUT}",
+    INCONCLUSIVE: "inconclusive",
+    SEEN_BELOW: f"lower in what was seen, where {NOT_RULED_OUT}",
+    BELOW: "lower",
 }
+_MOST_NAMED = 2  # the largest number of changed fields that a headline names
 SIDES = ("baseline", "variation")
 
 # Further quantities per mission, in addition to the paper's metrics.
@@ -218,36 +220,12 @@ def best_policy_of_side(results: Results, point: int) -> str:
     return summary.best_policy(missions[missions["point"] == point])
 
 
-def conclusion_in_words(answer: Any) -> str:
-    """What a row of ``compare_sides`` says about the product, in Markdown."""
-    words = {
-        ABOVE: "is **higher** in the variation",
-        SEEN_ABOVE: f"is **higher in what was seen** ({NOT_RULED_OUT})",
-        INCONCLUSIVE: "is **inconclusive**",
-        SEEN_BELOW: f"is **lower in what was seen** ({NOT_RULED_OUT})",
-        BELOW: "is **lower** in the variation",
-    }
-    verdict = judge_difference(answer)
-    missing = ""
-    if verdict not in (ABOVE, BELOW):
-        missing = _missing_in_words(answer)
-    return (
-        f"**{answer.policy}**: product {words[verdict]}, by {format_change(answer)} points: from "
-        f"{numbers.format_percent(answer.before)} to {numbers.format_percent(answer.after)}."
-        f"{missing}"
-    )
-
-
 def _missing_in_words(answer: Any) -> str:
-    """How many missions would be needed for a conclusive answer, in words."""
+    """How many missions would probably show a difference of the size of the estimate."""
     needed = missions_needed(answer)
     if needed == np.inf:
-        return " These missions do not tell how many would show a difference."
-    return (
-        " If the true difference is as large as this estimate, about "
-        f"{float(f'{needed:.2g}'):,.0f} missions (instead of {answer.n:,}) show it with a "
-        f"probability of {100 * POWER:g} %. Only the additional missions would be simulated."
-    )
+        return "these do not tell"
+    return f"about {float(f'{needed:.2g}'):,.0f} for a probability of {100 * POWER:g} %"
 
 
 def format_change(answer: Any) -> str:
@@ -299,148 +277,63 @@ class Variation:
         table = self.table()
         return table[table["metric"] == PRODUCT].itertuples()
 
-    def answer(self) -> str:
-        """The paired differences in product, in words (Markdown)."""
-        before, after = map(self._best, (BASELINE, VARIATION))
-        lines = "\n".join(f"- {conclusion_in_words(row)}" for row in self._of_product())
-        return f"{lines}\n\nThe highest mean: in the baseline {before}; in the variation {after}."
-
-    def sentence(self) -> str:
-        """What the variation changes, in a sentence."""
-        new = [
+    def headline(self) -> str:
+        """What is changed, and by how much that changes the product of the shown policy."""
+        changes = [
             f"{field_named(side.Field).words(side.Variation)} instead of {side.Baseline}"
             for side in self._fields(self._changed).itertuples()
         ]
-        parts = []
+        changed = numbers.join_words(changes)
+        if len(changes) > _MOST_NAMED:
+            changed = f"{len(changes)} changed fields"
+        (row,) = (row for row in self._of_product() if row.policy == self.shown)
+        return f"{changed}: product with {self.shown} {format_change(row)} points."
+
+    def facts(self) -> list[Fact]:
+        """How the product of every policy changes, by the mean and in how many missions."""
+        facts = []
         for row in self._of_product():
-            doubt = _DOUBTS.get(judge_difference(row), "")
-            parts.append(f"that of {row.policy} by {format_change(row)} points{doubt}")
-        n = f"n = {numbers.format_span(row.n for row in self._of_product())} pairs"
-        with_new = numbers.join_words(new)
-        changes = f"With {with_new}, the product changes: {numbers.join_words(parts)}; {n}."
-        return f"{changes} {self._way_home()}".strip()
-
-    def _way_home(self) -> str:
-        """In how many missions of both sides all UAVs could fly home; empty without need."""
+            facts += self._product_facts(row)
         table = self.table()
-        shares = table[table["metric"] == HOME]
-        if shares.empty:
-            return ""
-        parts = [
-            f"with {row.policy} in {numbers.format_percent(row.before)} of the missions before and "
-            f"in {numbers.format_percent(row.after)} after"
-            for row in shares.itertuples()
+        for row in table[table["metric"] == HOME].itertuples():
+            before, after = map(numbers.format_percent, (row.before, row.after))
+            label = f"{metric_of(HOME).within} with {row.policy}"
+            facts.append(Fact(label, f"{before} before, {after} after"))
+        facts += [
+            Fact(f"best in the {side}", self._best(point)) for point, side in enumerate(SIDES)
         ]
-        return (
-            f"All UAVs end with the battery for the way home {numbers.join_words(parts)}. "
-            "With landing = true, missions end on the ground."
-        )
+        return known_facts(facts)
 
-    def sentences(self) -> list[str]:
-        """What the variation changes, then the conclusion on every policy, in Markdown."""
-        return [self.sentence(), *map(conclusion_in_words, self._of_product())]
+    def _product_facts(self, row: Any) -> list[Fact]:
+        """What a row of ``compare_sides`` on the product says of its policy.
+
+        A failed mission counts 0 in the product, so that a few of them can outweigh many small
+        gains: the product may be higher in most missions and lower on average.
+        """
+        policy = row.policy
+        verdict = judge_difference(row)
+        before, after = map(numbers.format_percent, (row.before, row.after))
+        gaps = product_differences(self.results, policy)
+        better, worse = (numbers.format_percent(share.mean()) for share in (gaps > 0, gaps < 0))
+        missions = self.results.missions_of(policy)
+        failures = (1 - missions[SUCCESS]).groupby(missions["point"]).sum().astype(int)
+        change = f"{format_change(row)} points, {_VERDICTS[verdict]}"
+        facts = [
+            Fact(f"product with {policy}", f"{change}; {before} before, {after} after"),
+            Fact(f"{row.n:,} pairs with {policy}", f"better in {better}, worse in {worse}"),
+        ]
+        if failures.any():
+            counts = f"{failures[BASELINE]:,} before, {failures[VARIATION]:,} after"
+            facts.append(Fact(f"failed missions with {policy}", counts))
+        if verdict not in (ABOVE, BELOW):
+            facts.append(Fact(f"missions to show it with {policy}", _missing_in_words(row)))
+        return facts
 
     def _best(self, point: int) -> str:
         """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
         policy = best_policy_of_side(self.results, point)
         mean = estimate_metric(self.results, policy, point=point)
         return f"{policy}, {numbers.format_estimate(mean)}"
-
-    def winners(self) -> str:
-        """In words: the shares of the missions in which each policy is better or worse."""
-        gaps = {
-            policy: product_differences(self.results, policy) for policy in self.results.policies
-        }
-        return "; ".join(
-            f"{policy} is better in {numbers.format_percent((of_policy > 0).mean())} and worse in "
-            f"{numbers.format_percent((of_policy < 0).mean())}"
-            for policy, of_policy in gaps.items()
-        )
-
-    def finding(self) -> str:
-        """The caption of the figure of all differences: which policy gains or loses most."""
-        rows = [*self._of_product()]
-        row = max(rows, key=lambda of_policy: abs(of_policy.difference))
-        most = " most" if len(rows) > 1 else ""
-        doubt = _DOUBTS.get(judge_difference(row), "")
-        return (
-            f"The product changes{most} with {row.policy}: by {format_change(row)} points{doubt}."
-        )
-
-    def finding_of(self, metric: str) -> str:
-        """The caption of the figure of a metric: its means in the baseline and the variation."""
-        table = self.table()
-        measure = metric_of(metric)
-        parts = [
-            f"from {measure.write(row.before)} to {measure.write(row.after)} with {row.policy}"
-            for row in table[table["metric"] == metric].dropna(subset="difference").itertuples()
-        ]
-        return f"{measure.name}: {numbers.join_words(parts)}." if parts else f"{measure.name}."
-
-    def contrasts(self) -> str:
-        """In words: the policies that are better in most missions and worse on average, or so.
-
-        A failed mission counts 0 in the product, so that a few of them can outweigh many small
-        gains. Empty if the variation does this to no policy.
-        """
-        successes = self.results.missions.groupby(["policy", "point"])[SUCCESS]
-        failures = (successes.size() - successes.sum()).astype(int)
-        sentences = []
-        for policy in self.results.missions["policy"].unique():
-            gaps = product_differences(self.results, policy)
-            mostly = np.sign((gaps > 0).sum() - (gaps < 0).sum())
-            if mostly * gaps.mean() >= 0:
-                continue
-            sides = "higher", "lower"
-            if mostly > 0:
-                often, on_average = sides
-            else:
-                often, on_average = sides[::-1]
-            before, after = (failures[policy, point] for point in (BASELINE, VARIATION))
-            why = ""
-            if mostly * (after - before) > 0:
-                why = f": a failed mission counts 0, and {after} fail in place of {before}"
-            sentences.append(
-                f"With {policy}, the product is {often} in more missions than it is {on_average}, "
-                f"and {on_average} on average{why}."
-            )
-        return " ".join(sentences)
-
-    def reading(self) -> str:
-        """How the intervals and marks that occur in the answer are read, in sentences."""
-        table = self.table()
-        table = table[table["metric"].isin([*METRICS])]
-        verdicts = [judge_difference(row) for row in table.itertuples()]
-        sentences = []
-        if INCONCLUSIVE in verdicts:
-            sentences.append("A difference is inconclusive (≈) if its interval contains 0.")
-        if {SEEN_ABOVE, SEEN_BELOW} & {*verdicts}:
-            sentences.append(
-                "It is higher (△) or lower (▽) in what was seen if its interval contains 0 only "
-                "because it allows for failures that are too rare to be in these missions."
-            )
-        if any(self._overlap(row.policy, row.metric) for row in self._clear(table, verdicts)):
-            sentences.append(
-                "Intervals of the means may overlap although the paired difference is clear."
-            )
-        if trained_policies_by_learner(self.results):
-            sentences.append(
-                "A learned policy is used as it was trained; in a setting far from its training, "
-                "a new training may do better."
-            )
-        return " ".join(sentences)
-
-    @staticmethod
-    def _clear(table: pd.DataFrame, verdicts: Sequence[str]) -> list[Any]:
-        """The rows with a verdict."""
-        rows = zip(table.itertuples(), verdicts, strict=True)
-        return [row for row, of_row in rows if of_row in (ABOVE, BELOW)]
-
-    def _overlap(self, policy: str, metric: str) -> bool:
-        """Whether the intervals of the means of both sides overlap."""
-        rows = means_of_sides(self.results)
-        rows = rows[(rows["policy"] == policy) & (rows["metric"] == metric)]
-        return bool(rows["low"].max() <= rows["high"].min())
 
     @property
     def _changed(self) -> dict[str, Any]:

@@ -1,8 +1,9 @@
-"""Questions asked in one line, ``analysis.sweep`` and ``analysis.what_if``, and their answer."""
+"""Questions asked in one line, ``analysis.sweep`` and ``analysis.what_if``, and their answers."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,29 +13,29 @@ from dess import InputError
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings, prices_in_words
+from dess.analysis.answers.fleet.costs import mean_cost_parts, price_facts, priced_settings
+from dess.analysis.answers.fleet.risk import risk_facts
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
-    best_settings_sentences,
+    best_setting_facts,
+    best_setting_headline,
     rank_settings,
     ranked_table,
 )
 from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of_side
 from dess.analysis.ask import around
-from dess.analysis.ask.assumptions import assumption_sentences
-from dess.analysis.ask.brief import brief_sentences
-from dess.analysis.ask.question import (
-    Question,
-    strip_markdown,
-    sweep_question,
-    values_of,
-    what_if_question,
-)
+from dess.analysis.ask.around import one_more_facts
+from dess.analysis.ask.assumptions import assumption_facts
+from dess.analysis.ask.falls import fall_facts
+from dess.analysis.ask.limits import limit_facts
+from dess.analysis.ask.question import Question, sweep_question, values_of, what_if_question
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import as_sentences
+from dess.analysis.sheet import scenario_notes
+from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -43,36 +44,108 @@ if TYPE_CHECKING:  # figures need the extra reports
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """The answer to a question.
-
-    A sweep asks for the best setting, or with requirements for the cheapest fleet; a what-if
-    question asks what changes in a variation of a baseline.
+class Answer(ABC):
+    """The answer to a question: a headline, facts, tables and a figure.
 
     Attributes:
-        question: The study that was run, its folder and its command.
         results: The results; ``results.missions`` is a tidy table of the missions.
-        shown: Of a what-if question, the policy whose missions are drawn; without one, the best
-            one in the variation.
+        question: The study that was run and its folder; None if the results are those of another
+            study.
     """
 
-    question: Question
     results: Results
-    shown: str | None = None
+    question: Question | None = None
+
+    @abstractmethod
+    def headline(self) -> str:
+        """The answer in a sentence."""
+
+    @abstractmethod
+    def own_facts(self) -> list[Fact]:
+        """What was found, required and guaranteed."""
+
+    @abstractmethod
+    def table(self) -> pd.DataFrame:
+        """The numbers of what was compared, a row for each."""
+
+    @abstractmethod
+    def brief_tables(self) -> list[Table]:
+        """The answer in few tables, as the terminal prints them, with what is said below each."""
+
+    @abstractmethod
+    def plot(self) -> "Figure":
+        """The figure that shows the answer."""
+
+    def facts(self) -> list[Fact]:
+        """The facts of the answer, and with a data sheet which nodes no UAV can serve."""
+        notes = scenario_notes(self.results.store.manifest.scenarios)
+        return [*self.own_facts(), *(Fact("note", note) for note in notes)]
 
     @property
-    def variation(self) -> Variation:
-        """Of a what-if question: the variation compared with its baseline."""
-        return Variation(self.results, self.shown or best_policy_of_side(self.results, VARIATION))
+    def command(self) -> str:
+        """The command that asks the question again; empty if the study is no question."""
+        if self.question is None:
+            return ""
+        return self.question.command
+
+    def assumptions(self) -> list[Fact]:
+        """What the answer assumes, where the scenario has a data sheet."""
+        return []
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The numbers of the answer by name."""
+        return {"table": self.table()}
+
+    def _repr_markdown_(self) -> str:
+        """What Jupyter shows."""
+        lines = [f"- {fact.line}" for fact in self.facts()]
+        return "\n".join([f"**{self.headline()}**", "", *lines])
+
+
+@dataclass(frozen=True, eq=False)
+class SweepAnswer(Answer):
+    """The settings of a sweep, the best first. A setting is a policy with values of swept fields.
+
+    Attributes:
+        metric: The metric that ranks the settings; None for the product.
+    """
+
+    metric: str | None = None
+
+    @property
+    def _ranking_metric(self) -> str:
+        return self.metric or PRODUCT
+
+    def headline(self) -> str:
+        """The best setting and its mean."""
+        return best_setting_headline(self.results, self._ranked(), self._ranking_metric)
+
+    def own_facts(self) -> list[Fact]:
+        """The best setting, how the others compare, those of other policies, and the prices."""
+        facts = best_setting_facts(self.results, self._ranked(), self._ranking_metric)
+        if self.results.study.costs:
+            facts += price_facts(self.results)
+        return facts
+
+    def assumptions(self) -> list[Fact]:
+        """What the answer assumes, where the scenario has a data sheet."""
+        if not self._has_sheets:
+            return []
+        return assumption_facts(self.results, self._ranking_metric)
+
+    @property
+    def _has_sheets(self) -> bool:
+        return all(space.units for space in self.results.store.manifest.scenarios)
+
+    def _ranked(self, metric: str | None = None) -> pd.DataFrame:
+        return rank_settings(self.results, metric or self._ranking_metric)
 
     def table(self, metric: str | None = None) -> pd.DataFrame:
-        """What was compared: the settings, the best first; of a what-if question, the differences.
-
-        A setting is a policy with a value of every swept field.
+        """The settings, the best first.
 
         Args:
-            metric: The metric that ranks the settings, ``cost`` included if there are prices. By
-                default the product.
+            metric: The metric that ranks them, ``cost`` included if there are prices. By default
+                that of the answer.
 
         Returns:
             A row per setting with ``rank``, ``policy``, ``point``, ``n`` missions, the swept
@@ -82,20 +155,13 @@ class Answer:
             With prices also ``cost`` with its interval, and its parts where costs are those of a
             year. With requirements also the ``verdict`` (``met``, ``missed`` or ``open``), and
             ``selected``: whether the setting is the selected one of its policy under its condition.
-            Of a what-if question, a row per policy and metric, as
-            ``answers.variation.compare_sides`` returns it.
         """
-        if self.question.is_comparison:
-            return self.variation.table()
-        table = rank_settings(self.results, metric or PRODUCT)
-        study = self.question.study
-        if study.costs is None:
+        table = self._ranked(metric)
+        costs = self.results.study.costs
+        if costs is None:
             return table
-        if study.selection:
-            priced = [verdicts.judge_settings(self.results)]
-        else:
-            priced = [priced_settings(self.results)]
-        if study.costs.years is not None:
+        priced = [self._priced_settings()]
+        if costs.years is not None:
             priced.append(mean_cost_parts(self.results).drop(columns="stranded"))
         key = ["policy", "point"]
         for columns in priced:
@@ -103,105 +169,23 @@ class Answer:
             table = table.merge(columns[more], on=key, how="left")
         return table
 
-    def fleets(self) -> pd.DataFrame:
-        """With requirements: the fleets that the answer was chosen from, the cheapest first.
-
-        Returns:
-            A row per policy and fleet, as ``answers.fleet.tables.fleet_rows`` returns it.
-        """
-        return fleet_tables.fleet_rows(self.results)
+    def _priced_settings(self) -> pd.DataFrame:
+        return priced_settings(self.results)
 
     def best(self, metric: str | None = None) -> pd.DataFrame:
         """The best setting of every policy, the best policy first.
 
-        With requirements, the cheapest settings that meet them: one for each policy and condition
-        (the values of swept fields that no operator decides on, such as the arrival rate). There is
-        none where no setting is known to meet the requirements.
-        """
-        table = self.table(metric)
-        if self.question.study.selection:
-            return table[table["selected"]].sort_values("point", kind="stable", ignore_index=True)
-        return table.drop_duplicates("policy", ignore_index=True)
-
-    def answers(self, metric: str | None = None) -> list[str]:
-        """The answer in sentences, and with a data sheet which nodes no UAV can serve.
-
-        They tell the best setting, and what other policies would have said. With requirements, the
-        cheapest fleet of all policies first, the prices, how sure the answer is, and then the
-        fleets of each other policy and condition. Of a what-if question, what the variation
-        changes, and the conclusion on every policy.
-
         Args:
-            metric: The metric that ranks the settings, where there are no requirements. By default
-                the product.
+            metric: As in ``table``.
         """
-        notes = as_sentences(self.question.notes)
-        if self.question.is_comparison:
-            return [*map(strip_markdown, self.variation.sentences()), *notes]
-        if self.question.study.selection:
-            first, *others = search_of(self.results).sentences()
-            sentences = (first, *brief_sentences(self.results), *others)
-            return [*map(strip_markdown, sentences), *notes]
-        ranking = metric or PRODUCT
-        ranked = rank_settings(self.results, ranking)
-        lines = best_settings_sentences(self.results, ranked, ranking)
-        if self.question.study.costs:
-            lines.append(prices_in_words(self.results))
-        return [*lines, *notes]
+        return self.table(metric).drop_duplicates("policy", ignore_index=True)
 
-    def assumptions(self, metric: str | None = None) -> list[str]:
-        """What the answer to a sweep of a scenario with a data sheet assumes; otherwise nothing.
-
-        Args:
-            metric: The metric that ranks the settings, where there are no requirements. By default
-                the product.
-        """
-        has_sheets = all(space.units for space in self.results.store.manifest.scenarios)
-        if self.question.is_comparison or not has_sheets:
-            return []
-        return assumption_sentences(self.results, metric or PRODUCT)
-
-    def tables(self, metric: str | None = None) -> dict[str, pd.DataFrame]:
-        """The numbers of the answer by name: ``table``, and with requirements ``fleets``."""
-        frames = {"table": self.table(metric)}
-        if self.question.study.selection:
-            frames["fleets"] = self.fleets()
-        return frames
-
-    def brief_tables(self, metric: str | None = None) -> list[Table]:
-        """The answer in few tables, as the terminal prints them, with what is said below each.
-
-        They have the first settings of the ranking; with requirements, the fleets by cost, and what
-        a change of the cheapest brings; of a what-if question, what was measured on both sides.
-
-        Args:
-            metric: The metric that ranks the settings; with requirements, one that is shown beside
-                those of the requirements.
-        """
-        if self.question.is_comparison:
-            return [self.variation.measures_table(policy) for policy in self.results.policies]
-        if not self.question.study.selection:
-            return [ranked_table(self.results, self.table(metric), metric or PRODUCT)]
-        tables = [fleet_tables.brief_fleet_table(self.results, metric or SUCCESS)]
-        if around.is_known(self.results):
-            tables.append(around.table_around(self.results)._replace(caption=""))
-        return tables
-
-    def question_around(self) -> Question | None:
-        """What to ask about changes around the cheapest fleet, if the answer is one."""
-        if not self.question.study.selection:
-            return None
-        return around.question_around(self.results, self.question.study.scenario)
-
-    @property
-    def guarantee(self) -> str:
-        """With requirements: what is guaranteed about the selected settings, in words."""
-        return "; ".join(search_of(self.results).guarantee_sentences())
+    def brief_tables(self) -> list[Table]:
+        """The first settings of the ranking."""
+        return [ranked_table(self.results, self.table(), self._ranking_metric)]
 
     def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.
-
-        Of a what-if question, the paired differences of the metrics, with intervals.
 
         Args:
             x: The field on the horizontal axis. By default the first swept field, with the second
@@ -212,8 +196,6 @@ class Answer:
         Raises:
             InputError: If a field is not swept, or there is no such metric.
         """
-        if self.question.is_comparison:
-            return self.variation.plot()
         from dess.analysis.answers.settings.figures import draw_curves
 
         if x is None:
@@ -223,11 +205,120 @@ class Answer:
             hue = hue or next(iter(fields[1:]), None)
         return draw_curves(self.results, x, hue, metric).figure
 
-    def _repr_markdown_(self) -> str:
-        """What Jupyter shows."""
-        if self.question.is_comparison:
-            return self.variation.answer()
-        return "\n\n".join(self.answers())
+
+@dataclass(frozen=True, eq=False)
+class FleetAnswer(SweepAnswer):
+    """The cheapest fleet that meets requirements.
+
+    ``metric`` is one that is shown beside those of the requirements.
+    """
+
+    def headline(self) -> str:
+        """What to buy, and what it costs."""
+        return search_of(self.results).headline()
+
+    def own_facts(self) -> list[Fact]:
+        """The fleet by its requirements, the next cheaper, other policies, and what may go wrong.
+
+        With a data sheet also what breaks the fleet first, and what one more UAV brings.
+        """
+        results = self.results
+        facts = search_of(results).facts()
+        if self._has_sheets:
+            best = search_of(results).best
+            facts += risk_facts(results, best.policy, best.points)
+            facts += [*limit_facts(results), *one_more_facts(results), *fall_facts(results)]
+        return [*facts, *price_facts(results)]
+
+    def fleets(self) -> pd.DataFrame:
+        """The fleets that the answer was chosen from, the cheapest first.
+
+        Returns:
+            A row per policy and fleet, as ``answers.fleet.tables.fleet_rows`` returns it.
+        """
+        return fleet_tables.fleet_rows(self.results)
+
+    def _priced_settings(self) -> pd.DataFrame:
+        return verdicts.judge_settings(self.results)
+
+    def best(self, metric: str | None = None) -> pd.DataFrame:
+        """The cheapest settings that meet the requirements.
+
+        There is one for each policy and condition (the values of swept fields that no operator
+        decides on, such as the arrival rate), and none where no setting is known to meet them.
+
+        Args:
+            metric: As in ``table``.
+        """
+        table = self.table(metric)
+        return table[table["selected"]].sort_values("point", kind="stable", ignore_index=True)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The settings as ``table``, and the ``fleets``."""
+        return {**super().tables(), "fleets": self.fleets()}
+
+    def brief_tables(self) -> list[Table]:
+        """The fleets by cost, and what a change of the cheapest brings."""
+        tables = [fleet_tables.brief_fleet_table(self.results, self.metric or SUCCESS)]
+        if around.is_known(self.results):
+            tables.append(around.table_around(self.results)._replace(caption=""))
+        return tables
+
+    @property
+    def guarantee(self) -> str:
+        """What is guaranteed about the selected settings, in words."""
+        return "; ".join(search_of(self.results).guarantees())
+
+
+@dataclass(frozen=True, eq=False)
+class VariationAnswer(Answer):
+    """What changes in a variation of a baseline.
+
+    Attributes:
+        shown: The policy whose missions are drawn; without one, the best one in the variation.
+    """
+
+    shown: str | None = None
+
+    @property
+    def variation(self) -> Variation:
+        """The variation compared with its baseline."""
+        return Variation(self.results, self.shown or best_policy_of_side(self.results, VARIATION))
+
+    def headline(self) -> str:
+        """What is changed, and what that changes."""
+        return self.variation.headline()
+
+    def own_facts(self) -> list[Fact]:
+        """What the variation changes for every policy."""
+        return self.variation.facts()
+
+    def table(self) -> pd.DataFrame:
+        """The differences, a row per policy and metric, as ``answers.variation.compare_sides``."""
+        return self.variation.table()
+
+    def brief_tables(self) -> list[Table]:
+        """What was measured on both sides, a table for each policy."""
+        return [self.variation.measures_table(policy) for policy in self.results.policies]
+
+    def plot(self) -> "Figure":
+        """The paired differences of the metrics, with intervals."""
+        return self.variation.plot()
+
+
+def settings_answer(
+    results: Results, question: Question | None = None, metric: str | None = None
+) -> SweepAnswer:
+    """The answer of a sweep or of any study: the cheapest fleet if it searches for one.
+
+    Args:
+        results: The study.
+        question: The question, if it is one.
+        metric: The metric that ranks the settings, or is shown beside the required ones.
+    """
+    if isinstance(results.study.selection, Cheapest):
+        return FleetAnswer(results, question, metric)
+    return SweepAnswer(results, question, metric)
 
 
 def sweep(
@@ -244,7 +335,7 @@ def sweep(
     progress: bool | Progress = True,
     yes: bool = False,
     **fields: Any,
-) -> Answer:
+) -> SweepAnswer:
     """Simulate every combination of values of fields, and store the missions.
 
     The same sweep is answered at once the next time. With more missions or other values, only the
@@ -281,7 +372,7 @@ def sweep(
     question = sweep_question(
         values, scenario, policies, missions, seed, prices, requirements, name, folder=folder
     )
-    return _ask(question, workers, progress, yes)
+    return settings_answer(_ask(question, workers, progress, yes), question)
 
 
 def what_if(
@@ -297,7 +388,7 @@ def what_if(
     shown: str | None = None,
     progress: Progress | None = None,
     yes: bool = False,
-) -> Answer:
+) -> VariationAnswer:
     """Simulate a baseline and a variation of it with common random numbers, and compare them.
 
     The missions are stored in ``FOLDER/what-if``. The same question is answered at once the next
@@ -324,7 +415,7 @@ def what_if(
     """
     question = what_if_question(settings, baseline, scenario, policies, missions, seed, folder)
     check_shown(question, shown)
-    return replace(_ask(question, workers, progress, yes), shown=shown)
+    return VariationAnswer(_ask(question, workers, progress, yes), question, shown)
 
 
 def check_shown(question: Question, policy: str | None) -> None:
@@ -338,12 +429,12 @@ def check_shown(question: Question, policy: str | None) -> None:
         raise unknown_name("shown", f"{policy!r} is not asked about", policy, asked)
 
 
-def _ask(question: Question, workers: int, progress: bool | Progress | None, yes: bool) -> Answer:
+def _ask(question: Question, workers: int, progress: bool | Progress | None, yes: bool) -> Results:
     """Ask a question, with a progress bar if ``progress`` is True."""
     if progress is True:
         with _progress_bar() as (bar, announce):
-            return Answer(question, question.ask(workers, bar, announce, yes))
-    return Answer(question, question.ask(workers, progress or None, yes=yes))
+            return question.ask(workers, bar, announce, yes)
+    return question.ask(workers, progress or None, yes=yes)
 
 
 @contextmanager

@@ -28,6 +28,7 @@ from dess.analysis.answers.settings.points import (
     pads_in_words,
 )
 from dess.analysis.ask.question import FIRST, LONGEST, Question
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import COST
 from dess.analysis.names import field_named
 from dess.analysis.results.chunks import MANIFEST, short_hash
@@ -59,7 +60,9 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
     best = search_of(results).best
     manifest = results.store.manifest
     points = best.points
-    if not points or not results.scenario(points[-1]).units or is_path(best.policy):
+    if manifest.processes or not points or is_path(best.policy):
+        return None
+    if not results.scenario(points[-1]).units:
         return None
     fixed = manifest.study.set
     values = manifest.points[points[-1]].values
@@ -176,8 +179,8 @@ def table_around(results: Results) -> Table:
     return Table(cells, caption, data)
 
 
-def one_more_sentence(results: Results) -> str:
-    """What one more UAV costs and brings; empty if ``question_around`` does not know it.
+def one_more_facts(results: Results) -> list[Fact]:
+    """What one more UAV costs and brings; nothing if ``question_around`` does not know it.
 
     It flies all day: a spare that stands until another is lost is not simulated.
 
@@ -185,12 +188,12 @@ def one_more_sentence(results: Results) -> str:
         results: The study.
     """
     if not is_known(results):
-        return ""
+        return []
     changed_results = load_around(results)
     changes = list_changes(changed_results)
     with_one_more = [point for point, change in enumerate(changes, 1) if "uavs" in change]
     if not with_one_more:
-        return ""
+        return []
     costs = priced_settings(changed_results).set_index("point")[COST]
     more = numbers.format_money(costs[with_one_more[0]] - costs[0], results.prices.unit)
     metric = search_of(results).best.tightest_first[0].metric
@@ -199,10 +202,9 @@ def one_more_sentence(results: Results) -> str:
     ).set_index("point")
     row = differences.loc[with_one_more[0], ["difference", "low", "high"]]
     change = metric.change(*row)
-    return (
-        f"One more UAV, which flies all day, costs {more} more; with it, the {metric.within} "
-        f"changes by {change}."
-    )
+    if metric.in_percent:
+        change = f"{change} points"
+    return [Fact("one more UAV", f"+{more}; {metric.within} {change}")]
 
 
 def _verdicts_of_search(results: Results) -> dict[ScenarioSpace, Verdict]:

@@ -1,24 +1,25 @@
-"""What an answer assumes, in ten lines for the one who pays."""
+"""What an answer assumes, as facts for the one who pays."""
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.settings.ranking import rank_settings
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import value_text
 from dess.analysis.results.tables import Results
-from dess.analysis.sheet import as_sentences, battery_sentence, scenario_notes, type_sentences
+from dess.analysis.sheet import battery_sentence, type_sentences
 from dess.physics.fleet import IN_UNITS
-from dess.scenario.data_sheet import LORA, DataSheet
+from dess.scenario.data_sheet import LORA, DataSheet, lora
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 
 
-def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
+def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     """What a success, a slot and a cell are, who flies, and the data, radio, wind and failures.
 
     Args:
-        results: A study of a scenario with a data sheet. Where its design varies a field, the line
+        results: A study of a scenario with a data sheet. Where its design varies a field, the fact
             says so.
         metric: The metric that ranks its settings, where it does not search for a fleet.
     """
@@ -55,48 +56,45 @@ def assumption_sentences(results: Results, metric: str = PRODUCT) -> list[str]:
     else:
         end = "is lost for good"
     failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {end}"
-    return [
-        f"Success: at the end of a mission every UAV has landed{quota}.",
-        f"A slot is {printed(units.slot, 's')}, a hundredth of the endurance of "
-        f"{given('endurance', '')}; once a slot every UAV moves by a cell, hovers or charges.",
-        f"A cell is {printed(units.cell, 'm')} wide, the way of a slot at {given('cruise', '')}. "
-        f"The sea is {wide} x {high}.",
-        f"Who flies: the policy {_policy_of(results, metric)}, which knows the data left at every "
-        f"node; UAVs fly {value_text(space.altitude)} m high.",
-        f"A battery charges from empty to full in {given('charging', '')}; of it, "
-        f"{given('reserve', 'nothing')} is kept in reserve.",
-        f"Data: {given('data_rate', listed)} at each of {nodes} in messages of "
-        f"{given('message', sheet.assumed.get('message', ''))}, "
-        f"{given('backlog', listed if space.arrivals.initial else 'none')} at the start.",
-        f"Radio: an SNR of {given('snr', 'a link budget')}, path loss exponent "
-        f"{value_text(space.path_loss_exponent)}; range {given('range', 'without end')}; "
-        f"{given('bandwidth', '')} with {_rates_of(space, varied)}{duty}.",
-        f"Wind: {given('wind', 'none')}, the same everywhere and always. "
-        f"{_battery_of(space, varied)}",
-        *_types_of(space, varied),
-        f"Failures: {failures}." if sheet.mtbf or "mtbf" in varied else "Failures: none.",
-        f"A mission takes {given('horizon', printed(space.max_slots * units.slot, 's'))}; means "
-        "are over random missions, with 95 % intervals.",
-    ]
-
-
-def limit_sentences(results: Results) -> list[str]:
-    """Which nodes no UAV can serve, and which zones are small, for a page without the terminal."""
-    return as_sentences(scenario_notes(results.store.manifest.scenarios))
+    facts = {
+        "success": f"at the end of a mission every UAV has landed{quota}",
+        "slot": f"{printed(units.slot, 's')}, a hundredth of the endurance of "
+        f"{given('endurance', '')}; once a slot every UAV moves by a cell, hovers or charges",
+        "cell": f"{printed(units.cell, 'm')} wide, the way of a slot at {given('cruise', '')}",
+        "sea": f"{wide} x {high}",
+        "policy": f"{_policy_of(results, metric)}, which knows the data left at every node",
+        "altitude": f"{value_text(space.altitude)} m",
+        "charging": f"from empty to full in {given('charging', '')}",
+        "reserve": given("reserve", "none"),
+        "data": f"{given('data_rate', listed)} at each of {nodes} in messages of "
+        f"{given('message', sheet.assumed.get('message', ''))}",
+        "data at the start": given("backlog", listed if space.arrivals.initial else "none"),
+        "radio": f"SNR {given('snr', 'of a link budget')}, path loss exponent "
+        f"{value_text(space.path_loss_exponent)}, range {given('range', 'without end')}; "
+        f"{given('bandwidth', '')}, {_rates_of(space, varied)}{duty}",
+        "wind": f"{given('wind', 'none')}, the same everywhere and always",
+        "battery": _battery_of(space, varied),
+        **_types_of(space, varied),
+        "failures": failures if sheet.mtbf or "mtbf" in varied else "none",
+        "mission": given("horizon", printed(space.max_slots * units.slot, "s")),
+        "means": "over random missions, with 95 % intervals",
+    }
+    return [Fact(label, found) for label, found in facts.items()]
 
 
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
-    """What a slot takes of the battery, in a sentence."""
+    """What a slot takes of the battery."""
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
-        return "What a slot takes of the battery follows from the speed through the air."
-    return as_sentences([battery_sentence(space)])[0]
+        return "what a slot takes follows from the speed through the air"
+    return battery_sentence(space)
 
 
-def _types_of(space: ScenarioSpace, varied: set[str]) -> list[str]:
-    """What follows for each type of UAVs, a sentence for each, unless the types vary."""
+def _types_of(space: ScenarioSpace, varied: set[str]) -> dict[str, str]:
+    """What follows for each type of UAVs, unless the types vary."""
     if varied & {*IN_UNITS, "wind", "hover", "reserve", "tip_speed", "induced_speed", "fleet"}:
-        return []
-    return as_sentences(type_sentences(space))
+        return {}
+    named = (sentence.partition(": ") for sentence in type_sentences(space))
+    return {label: found for label, _, found in named}
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:
@@ -122,8 +120,9 @@ def _lora_rates_of(sheet: DataSheet) -> str:
         return (
             f"the rates of LoRa in packets of {sheet.packet}, their preambles and headers counted"
         )
-    fast = f"{sheet.lorawan_overhead(7):.2f} times as long with spreading factor 7"
-    slow = f"{sheet.lorawan_overhead(12):.2f} times with 12"
+    bandwidth = sheet.number("bandwidth")
+    fast = f"{lora.lorawan_overhead(7, bandwidth):.2f} times as long with spreading factor 7"
+    slow = f"{lora.lorawan_overhead(12, bandwidth):.2f} times with 12"
     overhead = f"with which a full LoRaWAN packet takes {fast} and {slow}"
     return f"the rates of LoRa without preambles and headers, {overhead}"
 

@@ -1,6 +1,6 @@
 """Why one more UAV or pad of the cheapest fleet collects less, from event logs of few missions.
 
-fall_sentences(results)  # results of a search, of which ``around.question_around`` was asked
+fall_facts(results)  # results of a search, of which ``around.question_around`` was asked
 draw_falls(results)
 """
 
@@ -12,6 +12,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.ask import around
+from dess.analysis.facts import Fact, known_facts
 from dess.analysis.figures import Drawing
 from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
 from dess.analysis.metrics import NODE_RATIOS, RATIO, metric_of
@@ -34,7 +35,7 @@ from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import printed
 
 MISSIONS = 10  # of the fleet, and of each neighbour that collects less
-NAMED = 3  # the largest number of activities that a sentence names
+NAMED = 3  # the largest number of activities that a fact names
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,23 +73,25 @@ class Fall:
     titles: list[str]
     units: Units | None
 
-    def sentence(self) -> str:
-        """How much less is collected, what the UAVs do instead, and whose fault it is."""
+    def facts(self) -> list[Fact]:
+        """How much less is collected, what the UAVs do instead, and which node loses most."""
         metric = metric_of(RATIO)
         change = metric.change(*self.difference[["difference", "low", "high"]])
         doubt = ""
         if not self.is_certain:
             doubt = f" in what was seen ({NOT_RULED_OUT})"
-        return (
-            f"With {self.fleet} instead of {self.before}, the {metric.within} is lower{doubt}, by "
-            f"{change} points: {self._changes_of_time()}. {self._last_data()}"
-            f"{self._worst_node()}This is due to "
-            f"the policy {self.policy} and its return guard, not to the fleet: it could do as "
-            "well as the smaller one if what is added stayed unused."
+        where = f"{self.fleet} instead of {self.before}"
+        return known_facts(
+            [
+                Fact(f"{where}, with {self.policy}", f"{metric.within} {change} points{doubt}"),
+                Fact(f"{where}: time of a UAV", ", ".join(self._changes_of_time())),
+                Fact(f"{where}: last data", self._last_data()),
+                Fact(f"{where}: node that loses most", self._worst_node()),
+            ]
         )
 
     def _last_data(self) -> str:
-        """When the last data are collected, if earlier than before, with a space behind it.
+        """When the last data of a mission are collected, if earlier than before.
 
         The shares of time do not tell it: UAVs may charge as long as before, but all at the end.
         """
@@ -96,8 +99,7 @@ class Fall:
         if position_of(change) != BELOW:
             return ""
         last = self._time_in_words(self.last_data.mean())
-        last_before = self._time_in_words(self.last_data_before.mean())
-        return f"The last data of a mission are collected after {last} instead of {last_before}. "
+        return f"after {last}, not {self._time_in_words(self.last_data_before.mean())}"
 
     def _time_in_words(self, slots: float) -> str:
         if self.units is None:
@@ -105,7 +107,7 @@ class Fall:
         return printed(slots * self.units.slot, "s")
 
     def _worst_node(self) -> str:
-        """The node that loses most, if the missions show that it does, with a space behind it."""
+        """The node that loses most, if the missions show that it does."""
         if not len(self.nodes):
             return ""
         node = int((self.nodes - self.nodes_before).mean(axis=0).argmin())
@@ -117,11 +119,11 @@ class Fall:
         share = numbers.format_percent(self.nodes[:, node].mean())
         share_before = numbers.format_percent(self.nodes_before[:, node].mean())
         return (
-            f"The node that loses most is {self.titles[node]}, from {share_before} to {share} of "
-            f"its data ({metric.change(*change)} points). "
+            f"{self.titles[node]}, {share} of its data, not {share_before} "
+            f"({metric.change(*change)} points)"
         )
 
-    def _changes_of_time(self) -> str:
+    def _changes_of_time(self) -> list[str]:
         """The activities whose shares of time differ most, with their means."""
         changes = []
         for activity in ACTIVITIES:
@@ -131,14 +133,9 @@ class Fall:
             if position_of(change) != INCONCLUSIVE:
                 share = numbers.format_percent(now.mean())
                 share_before = numbers.format_percent(before.mean())
-                text = f"{activity} for {share} of its time instead of {share_before}"
-                changes.append((abs(change.mean), text))
-        missions = f"in {len(self.shares)} missions of both"
-        if not changes:
-            return f"{missions}, the shares of time of the UAVs do not differ significantly"
+                changes.append((abs(change.mean), f"{activity} {share}, not {share_before}"))
         changes.sort(reverse=True)
-        most = [text for _, text in changes[:NAMED]]
-        return f"{missions}, a UAV {numbers.join_words(most)}"
+        return [text for _, text in changes[:NAMED]]
 
 
 def find_falls(results: Results) -> list[Fall]:
@@ -155,7 +152,7 @@ def find_falls(results: Results) -> list[Fall]:
     return _compare_neighbours(results)
 
 
-@compute_once  # since the sentences and the figure of a page need the same missions
+@compute_once  # since the facts and the figure of a page need the same missions
 def _compare_neighbours(results: Results) -> list[Fall]:
     changed_results = around.load_around(results)
     space = changed_results.scenario(0)
@@ -188,9 +185,9 @@ def _compare_neighbours(results: Results) -> list[Fall]:
     return falls
 
 
-def fall_sentences(results: Results) -> list[str]:
-    """A sentence for each neighbour that collects less; none if there is no such neighbour."""
-    return [fall.sentence() for fall in find_falls(results)]
+def fall_facts(results: Results) -> list[Fact]:
+    """The facts of each neighbour that collects less; none if there is no such neighbour."""
+    return [fact for fall in find_falls(results) for fact in fall.facts()]
 
 
 def draw_falls(results: Results) -> list[Drawing]:

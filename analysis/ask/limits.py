@@ -1,7 +1,7 @@
 """What a cheapest fleet bears: the most wind, failures and data with which it is good enough.
 
     find_limits(results, "my-sea.toml")  # results of a search for the cheapest setting
-    limit_sentences(results)
+    limit_facts(results)
 
 Each condition is made harder until the fleet breaks a requirement, on missions of the check of the
 fleet. The limits of data and wind are found by bisection, and the wind comes from eight directions.
@@ -24,6 +24,7 @@ from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.ask.around import place_beside
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import NODES_BEHIND, columns_in_units, metric_of
 from dess.analysis.results.parquet import columns_of_nodes
 from dess.analysis.results.tables import Results
@@ -55,9 +56,9 @@ _MORE_MISSIONS = 3  # times as many for failures
 
 # In the order in which conditions of equal hardness are told.
 _NAMES = {
-    "data_sheet.data_rate": "the data",
-    "data_sheet.wind": "the wind",
-    "data_sheet.mtbf": "failures",
+    "data_sheet.data_rate": "data that it bears",
+    "data_sheet.wind": "wind that it bears",
+    "data_sheet.mtbf": "failures of a UAV in flight that it bears",
 }
 
 
@@ -246,6 +247,8 @@ def find_limits(
     best = search_of(results).best
     path = place_of_limits(results)
     if not best.points or is_path(best.policy) or results.checks.empty or path.exists():
+        return
+    if results.store.manifest.processes:
         return
     fleet = _Fleet(results, scenario, workers, progress, missions)
     if not fleet.space.units or fleet.space.needs_events:
@@ -678,57 +681,45 @@ def limits_of(results: Results) -> Limits | None:
     return Limits.load(path, "what dess sweep has written")
 
 
-def limit_sentences(results: Results) -> list[str]:
-    """What breaks the requirements of the fleet first, and how much of each condition it bears."""
+def limit_facts(results: Results) -> list[Fact]:
+    """How much of each condition the fleet bears, that which breaks a requirement first first."""
     document = limits_of(results)
     if document is None:
         return []
     if document.broken:
         name = metric_of(document.broken).within
-        return [f"In its check, the {name} breaks its requirement, so that no limits were sought."]
-    first, *others = document.limits
+        return [Fact("limits", f"not sought: in its check, the {name} breaks its requirement")]
     missions = numbers.format_count(document.missions, "mission")
-    method = (
-        f"Limits are found on {missions} of the check, that of failures on three times as many."
-    )
-    if first.broken:
-        start = f"What breaks it first is {_NAMES[first.field]}"
-    else:
-        start = f"Nothing that was tried breaks it. {_NAMES[first.field].capitalize()}"
-    lines = [f"{start}: {_limit_in_words(first)}. {method}"]
-    lines += [f"{_NAMES[limit.field].capitalize()}: {_limit_in_words(limit)}." for limit in others]
+    facts = [Fact(_NAMES[limit.field], _limit_in_words(limit)) for limit in document.limits]
     if not document.has_wind:
-        lines.append("Wind was not asked: the sheet has no max_speed.")
-    return lines
+        facts.append(Fact(_NAMES["data_sheet.wind"], "not asked: the sheet has no max_speed"))
+    method = f"{missions} of the check, for failures three times as many"
+    return [*facts, Fact("limits found on", method)]
 
 
 def _limit_in_words(limit: Limit) -> str:
-    """How hard a condition may be, and what ends it."""
+    """How hard a condition may be, what is assumed, and what ends it."""
+    every = ""
     if limit.field == "data_sheet.mtbf":
-        form = "one every {} of a UAV's flying"
-    else:
-        form = "{}"
+        every = "one every "
     if limit.last:
         about = ""
         if limit.is_rough:
             about = "about "
-        bears = f"up to {about}{form.format(limit.last)}"
+        bears = f"{about}{every}{limit.last}"
         if limit.field == "data_sheet.wind":
             bears = f"{bears}, the worst of {len(PLACES)} directions"
     elif limit.field == "data_sheet.wind":
         bears = f"not even {LEAST_WIND:g} m/s"
     else:
-        bears = f"not even {form.format(f'{1 / FAILURES[0]:g} h')}"
-    if limit.present:
-        assumed = f"{limit.present} is assumed"
-    else:
-        assumed = "none is assumed"
+        bears = f"not even {every}{1 / FAILURES[0]:g} h"
+    assumed = limit.present or "none"
     if limit.broken == SHEET:
-        end = "in more wind from there, the UAVs of the data sheet cannot fly"
+        end = "beyond it, UAVs cannot fly"
     elif limit.broken:
-        end = f"beyond it, the {metric_of(limit.broken).within} breaks its requirement"
+        end = f"beyond it, the {metric_of(limit.broken).within} breaks"
         if limit.small_zone:
             end = f"{end}, as UAVs are lost at {limit.small_zone}"
     else:
         end = "no more was tried"
-    return f"{bears} ({assumed}); {end}"
+    return f"{bears} ({assumed} assumed); {end}"

@@ -77,14 +77,6 @@ class Question:
     study: Study
     out: Path
 
-    @property
-    def is_comparison(self) -> bool:
-        """Whether it asks what changes in a variation of a baseline, and not for the best setting.
-
-        The design points are then the baseline and the variation.
-        """
-        return isinstance(self.study.design, TableDesign)
-
     @cached_property
     def notes(self) -> list[str]:
         """Which nodes no UAV can serve, the highest collection ratio, and zones that are small."""
@@ -446,8 +438,3 @@ def _as_toml_value(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_as_toml_value(item) for item in value]
     return value
-
-
-def strip_markdown(text: str) -> str:
-    """A sentence of Markdown as plain text."""
-    return text.replace("**", "").replace("`", "")

@@ -17,6 +17,7 @@ from dess.analysis.results.store import Count, Store
 from dess.analysis.study.study import Study
 from dess.base.files.memory import check_memory
 from dess.base.files.writing import check_folder
+from dess.model.processes import load_processes
 from dess.policies.registry import Policy, folder_of, load_team
 from dess.policies.shipped import SHIPPED
 from dess.scenario.scenario import ScenarioSpace
@@ -336,16 +337,18 @@ def _check_policies(study: Study) -> None:
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
-    places = {(s.size, s.rectangles, s.no_fly, s.nodes): s for s in study.scenarios}
+    places = {(s.geometry, s.nodes): s for s in study.scenarios}
     largest = max(space.uavs[1] for space in places.values())
     teams = _load_teams(study, largest)
+    processes = load_processes(study.processes)
     first, *others = places.values()
     by_size = sorted(others, key=lambda space: len(space.nodes) * math.prod(space.size))
     for number, space in enumerate([first, *by_size[-1:]]):
         first_slot = space.model_copy(update={"max_slots": 1})
         for team in teams:
             with _failures_left_to_the_run():
-                simulate_missions(study.engine, [first_slot], team, study.seed, [number])
+                about = (study.engine, [first_slot], team, study.seed, [number])
+                simulate_missions(*about, processes=processes)
 
 
 def _load_teams(study: Study, uavs: int) -> list[list[Policy]]:

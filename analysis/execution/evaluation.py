@@ -39,6 +39,7 @@ from dess.analysis.stats.intervals import Moments
 from dess.analysis.stats.weights import moments_of_space
 from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
+from dess.model.processes import load_processes
 from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import check_seed, spaces_of
 from dess.model.view import check_team
@@ -68,6 +69,7 @@ class Asked(NamedTuple):
         engine: ``batch`` or ``events``.
         workers: Threads of the batch engine, processes of the event engine.
         run_files: Whether Python files of the team may be run, since a user has typed it.
+        processes: The processes of the user in every mission, who has typed them.
     """
 
     scenario: ScenarioSpace
@@ -77,6 +79,7 @@ class Asked(NamedTuple):
     engine: str = "batch"
     workers: int = 1
     run_files: bool = False
+    processes: tuple[str, ...] = ()
 
     def load_policies(self) -> list[Policy]:
         """The policies of the team."""
@@ -299,7 +302,9 @@ def check_evaluation(asked: Sequence[Asked], yes: bool = False) -> None:
         ]
         effort.check_time(what, reduce(effort.Range.plus, times))
     for team in asked[1:]:  # the first one is refused at its first mission
-        simulate_missions(engine, [scenario], team.load_policies(), team.seed, [0])
+        processes = load_processes(team.processes)
+        policies = team.load_policies()
+        simulate_missions(engine, [scenario], policies, team.seed, [0], processes=processes)
 
 
 def _missions_at_once(scenario: ScenarioSpace) -> int:
@@ -339,7 +344,7 @@ def _event_jobs(asked: Asked, replications: range) -> list[Job]:
     """Jobs of the event engine."""
     chunks = split_into_chunks([CellPart(Cell(0, 0, "", 0), replications)], CHUNK["events"])
     spaces = (asked.scenario,)
-    about = (asked.team, asked.seed, "events", asked.run_files)
+    about = (asked.team, asked.seed, "events", asked.run_files, asked.processes)
     return [MissionsJob(chunk, spaces, *about) for chunk in chunks]
 
 

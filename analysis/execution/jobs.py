@@ -14,8 +14,16 @@ from dess.analysis.bound import Bound, upper_bound
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import Chunk
 from dess.analysis.results.manifest import Cell, CellPart
-from dess.analysis.results.provenance import Member, bound_code, members_of
+from dess.analysis.results.provenance import (
+    Member,
+    ProcessIdentity,
+    bound_code,
+    identify_process,
+    members_of,
+)
 from dess.analysis.results.store import Store
+from dess.model.mission import Process
+from dess.model.processes import load_processes
 from dess.model.record import Records, empty_records_of
 from dess.policies.registry import load_team
 from dess.scenario.scenario import ScenarioSpace
@@ -32,6 +40,7 @@ def simulate_missions(
     seed: int,
     replications: Sequence[int],
     progress: Callable[[int], object] | None = None,
+    processes: Sequence[Process] = (),
 ) -> Records:
     """Simulate missions one after the other, or together with the batch engine.
 
@@ -42,6 +51,7 @@ def simulate_missions(
         seed: Seed of the missions.
         replications: The replication of each mission.
         progress: Called with the number of missions finished since its last call.
+        processes: The processes of the user in every mission, for the engine ``events``.
 
     Raises:
         InputError: If the batch engine cannot simulate one of the scenarios.
@@ -51,7 +61,8 @@ def simulate_missions(
         return simulate_batch(spaces, team[:fleet], seed, replications, progress=progress)
     records = empty_records_of(spaces, len(spaces))
     for row, (space, replication) in enumerate(zip(spaces, replications, strict=True)):
-        records.add(row, simulate(space, team[: space.uavs[1]], seed, replication))
+        acting = team[: space.uavs[1]]
+        records.add(row, simulate(space, acting, seed, replication, processes=processes))
         if progress:
             progress(1)
     return records
@@ -74,6 +85,7 @@ class Job(ABC):
         seed: Seed of the missions.
         engine: ``batch`` or ``events``, for the records.
         run_files: Whether Python files of the team may be run, since a user has typed it.
+        processes: The processes of the user in every mission, who has typed them.
         kind: The kind of work, as in ``store.TABLES``.
         work: What is made in place of records, in words.
     """
@@ -84,6 +96,7 @@ class Job(ABC):
     seed: int
     engine: str
     run_files: bool = False
+    processes: tuple[str, ...] = ()
     kind: ClassVar[str]
     work: ClassVar[str] = ""
 
@@ -117,9 +130,12 @@ class Job(ABC):
         return
 
     @property
-    def code(self) -> list[Member] | str:
+    def code(self) -> list[Member | ProcessIdentity] | str:
         """The code, beside that of the engines, on which the result depends."""
-        return members_of(self.policy, run_files=self.run_files)
+        return [
+            *members_of(self.policy, run_files=self.run_files),
+            *map(identify_process, self.processes),
+        ]
 
 
 class MissionsJob(Job):
@@ -132,7 +148,10 @@ class MissionsJob(Job):
         largest = max(space.uavs[1] for space in self.spaces)
         team = load_team(self.policy, largest, run_files=self.run_files)
         spaces, _, replications = zip(*self.each, strict=True)
-        return simulate_missions(self.engine, spaces, team, self.seed, replications, progress)
+        processes = load_processes(self.processes)
+        return simulate_missions(
+            self.engine, spaces, team, self.seed, replications, progress, processes
+        )
 
     def save(self, store: Store, records: Records) -> None:
         """Store the records."""
@@ -143,7 +162,7 @@ class MissionsJob(Job):
 
         Most studies have greedy, so nothing is compiled that no worker needs.
         """
-        replace(next(self.alone()), policy="greedy").run()
+        replace(next(self.alone()), policy="greedy", processes=()).run()
 
 
 class LogJob(Job):
@@ -155,7 +174,9 @@ class LogJob(Job):
         """Simulate the mission with the SimPy engine."""
         ((space, _, replication),) = self.each
         team = load_team(self.policy, space.uavs[1], run_files=self.run_files)
-        log = simulate(space, team, self.seed, replication, events=True).events
+        processes = load_processes(self.processes)
+        about = (space, team, self.seed, replication)
+        log = simulate(*about, events=True, processes=processes).events
         assert log is not None
         return log.columns()
 

@@ -217,7 +217,8 @@ class _Run:
                 if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
                     spaces = tuple(study.scenarios[part.cell.point] for part in missing)
                     kept = chunks.Chunk(team, missing)
-                    yield kind(kept, spaces, policy, study.seed, study.engine, study.run_files)
+                    typed = (study.run_files, study.processes)
+                    yield kind(kept, spaces, policy, study.seed, study.engine, *typed)
 
     def _size(self, kind: type[Job], policy: str) -> int:
         """The number of missions of a chunk."""

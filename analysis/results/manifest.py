@@ -122,7 +122,9 @@ class Manifest(provenance.Origin):
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
-            code=provenance.code_behind(study.policies, study.bounds, run_files=study.run_files),
+            code=provenance.code_behind(
+                study.policies, study.bounds, study.processes, run_files=study.run_files
+            ),
             engine_code=provenance.engine_code(),
             accepted=[],
             commit=provenance.commit_of_source(),
@@ -138,6 +140,7 @@ class Manifest(provenance.Origin):
             selected=[None] * len(study.policies),
             complete=False,
             bound_code=provenance.bound_code() if study.bounds else None,
+            processes=[provenance.identify_process(process) for process in study.processes],
         )
 
     @classmethod
@@ -181,6 +184,7 @@ class Manifest(provenance.Origin):
             "bound_code": self.bound_code or new.bound_code,
             "policies": [old_teams.get(team.policy, team) for team in new.policies],
             "accepted": self.accepted + accepted,
+            "processes": self.processes,
         }
         if self.study == new.study and self.points == new.points:
             update |= {name: getattr(self, name) for name in PROGRESS}
@@ -192,11 +196,14 @@ class Manifest(provenance.Origin):
         teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]
+        processes = self.functions
         is_same = (self.scenario, self.points) == (new.scenario, new.points)
         foreign = not is_same and not set(self._point_keys) <= set(new._point_keys)
         complaints = {
             f"holds study {kept_name}, not {name}": kept_name != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
+            f"holds missions with {processes}, not with {new.functions}": processes
+            != new.functions,
             f"holds other scenarios than those of study {name}": foreign,
             f"holds policy {' '.join(dropped)}, which study {name} does not have": bool(dropped),
             f"made by other weights of policy {' '.join(changed)}": bool(changed),
@@ -207,6 +214,12 @@ class Manifest(provenance.Origin):
         for complaint, holds in complaints.items():
             if holds:
                 raise InputError(path, complaint, _ALLOWED)
+
+    @property
+    def functions(self) -> str:
+        """The processes of the user in words."""
+        names = [identity.function for identity in self.processes]
+        return f"process {', '.join(names)}" if names else "no process"
 
     @property
     def key(self) -> str:
@@ -262,7 +275,9 @@ class Manifest(provenance.Origin):
     @cached_property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """The cells of every team, in the order of the design points."""
-        run = {"version": self.version, "code": self.engine_code, "seed": self.seed}
+        run: dict[str, Any] = {"version": self.version, "code": self.engine_code, "seed": self.seed}
+        if self.processes:
+            run["processes"] = [[process.function, process.code] for process in self.processes]
         members = [team.data["members"] for team in self.policies]
         return tuple(
             self._cells(n, run | {"members": of_team}) for n, of_team in enumerate(members)

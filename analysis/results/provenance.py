@@ -29,6 +29,8 @@ from dess.analysis.study.study import StudyData, change_scenario
 from dess.base.errors import to_input_error
 from dess.base.files.documents import Document, Sha256
 from dess.base.sources import OURS, code_of, combined
+from dess.model.mission import Process
+from dess.model.processes import load_process, load_processes
 from dess.policies.registry import Policy, is_confirmed, load_team
 from dess.scenario.scenario import SEA, ScenarioSpace, scenario_at
 
@@ -69,6 +71,20 @@ class Team(Document):
         return [(member.name, member.weights, member.learner) for member in self.members]
 
 
+class ProcessIdentity(Document):
+    """The identity of a process of a user, by the name that it was typed with.
+
+    Attributes:
+        process: Its file and its function.
+        function: The name of the function.
+        code: A hash of the code of its file and of what that imports.
+    """
+
+    process: Text
+    function: Text
+    code: Sha256
+
+
 class Acceptance(Document):
     """A change of code that was accepted by the option ``--accept-code``.
 
@@ -101,6 +117,7 @@ class Origin(Document):
         scenario: The complete scenario, before the design points change it.
         policies: The teams, with the hashes of code and weights that are part of the cells' keys.
         study: The study, with the name of its scenario in place of a path.
+        processes: The processes of the user in every mission, with the hashes of their code.
     """
 
     version: Version
@@ -113,6 +130,7 @@ class Origin(Document):
     scenario: dict[str, Any]
     policies: list[Team] = Field(min_length=1)
     study: StudyData
+    processes: list[ProcessIdentity] = []
 
     @field_serializer("study", mode="wrap")
     def _newest_first(self, study: StudyData, dump: SerializerFunctionWrapHandler) -> Any:
@@ -148,12 +166,22 @@ class Origin(Document):
     def _fields(self) -> str:
         return json.dumps(self.scenario)
 
+    def load_processes(self, named: Collection[str]) -> list[Process]:
+        """The processes of the missions, all of which the user has to name.
+
+        Raises:
+            InputError: If one of them is not named, or cannot be loaded.
+        """
+        typed = {name: name for name in named}
+        names = [identity.process for identity in self.processes]
+        return load_processes(typed.get(name, name) for name in names)
+
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.
 
         Args:
-            named: The teams that the user has named. Policies of other Python files are not loaded,
-                so they are not compared.
+            named: The teams and processes that the user has named. Those of other Python files are
+                not loaded, so they are not compared.
 
         Raises:
             InputError: If a policy cannot be loaded.
@@ -161,9 +189,13 @@ class Origin(Document):
         names = [team.policy for team in self.policies]
         closed = [name for name in names if not is_confirmed(name, named)]
         teams = {team.policy: team for team in self.policies if team.policy not in closed}
-        code_here = code_behind(teams, self.study.bounds, run_files=True)
+        processes = [identity.process for identity in self.processes]
+        opened = [process for process in named if process in processes]
+        unread = {"policy": closed, "process": [p for p in processes if p not in named]}
+        code_here = code_behind(teams, self.study.bounds, opened, run_files=True)
         changes = []
-        code = {name: code for name, code in self.code.items() if name in code_here or not closed}
+        has_all = not any(unread.values())
+        code = {name: code for name, code in self.code.items() if name in code_here or has_all}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
         elif modules := differing_modules(code, code_here):
@@ -171,10 +203,11 @@ class Origin(Document):
         present_teams = {name: team_of(name, run_files=True) for name in teams}
         if weights := [n for n in teams if teams[n].weights != present_teams[n].weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
-        if closed:
-            changes.append(
-                f"made by a Python file that was not read, of policy {', '.join(closed)}"
-            )
+        for kind, files in unread.items():
+            if files:
+                changes.append(
+                    f"made by a Python file that was not read, of {kind} {', '.join(files)}"
+                )
         versions = library_versions()
         recorded = self.libraries
         if others := [n for n in versions if n in recorded and recorded[n] != versions[n]]:
@@ -206,6 +239,13 @@ def _member_identity(policy: Policy) -> Member:
         raise to_input_error(error, "policy", Member) from None
 
 
+def identify_process(process: str) -> ProcessIdentity:
+    """The identity of a process that a user has typed, as this process has it."""
+    loaded = load_process(process)
+    code = combined(_code_hashes((loaded.module,)))
+    return ProcessIdentity(process=process, function=loaded.run.__name__, code=code)
+
+
 def engine_code() -> str:
     """A hash of the code of the engines."""
     return combined(_code_hashes(ENGINES))
@@ -217,10 +257,23 @@ def bound_code() -> str:
 
 
 def code_behind(
-    teams: Iterable[str], bounds: bool = False, *, run_files: bool = False
+    teams: Iterable[str],
+    bounds: bool = False,
+    processes: Iterable[str] = (),
+    *,
+    run_files: bool = False,
 ) -> dict[str, str]:
-    """Hashes of the modules that the records of teams, and bounds, depend on, by name."""
+    """Hashes of the modules that records and bounds depend on, by name.
+
+    Args:
+        teams: The teams of the missions.
+        bounds: Whether there are bounds.
+        processes: The processes of the user, who has typed them.
+        run_files: Whether Python files of the teams may be run.
+    """
     hashes = _code_hashes(ENGINES) | (_code_hashes(BOUND) if bounds else {})
+    for process in processes:
+        hashes |= _code_hashes((load_process(process).module,))
     for team in teams:
         for policy in load_team(team, run_files=run_files):
             hashes |= _code_hashes(_modules_of(policy))

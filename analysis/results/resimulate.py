@@ -21,6 +21,7 @@ from dess.analysis.study.stopping import Text
 from dess.base.files.documents import Document
 from dess.base.files.reading import hash_file, paths_in
 from dess.base.files.tables import LIMIT
+from dess.model.mission import Process
 from dess.model.record import (
     MISSION_RECORD,
     OPERATIONS,
@@ -107,14 +108,18 @@ class LoggedMission:
 
 
 def mission_of(
-    space: ScenarioSpace, team: Sequence[Policy], seed: int = 0, replication: int = 0
+    space: ScenarioSpace,
+    team: Sequence[Policy],
+    seed: int = 0,
+    replication: int = 0,
+    processes: Sequence[Process] = (),
 ) -> LoggedMission:
     """Simulate a mission of any scenario, with its event log.
 
     Raises:
         InputError: If a policy cannot act in the scenario.
     """
-    record = simulate(space, team, seed, replication, events=True)
+    record = simulate(space, team, seed, replication, events=True, processes=processes)
     assert record.events is not None
     scenario = sample_scenario(space, seed, replication)
     names = (policy.name for policy in team)
@@ -126,12 +131,14 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> L
     """Simulate a mission of a study again, with the SimPy engine.
 
     Raises:
-        InputError: If the study has no such mission, or if the new record differs from the stored
-            one.
+        InputError: If the study has no such mission, or has processes of Python files, which only
+            a user may name; or if the new record differs from the stored one.
     """
     space = results.scenario(point)
-    seed = results.store.manifest.seed
-    mission = mission_of(space, load_team(policy, space.uavs[1]), seed, replication)
+    manifest = results.store.manifest
+    team = load_team(policy, space.uavs[1])
+    processes = manifest.load_processes(())
+    mission = mission_of(space, team, manifest.seed, replication, processes)
     if changed := difference_in_words(
         mission.record, stored_record(results, policy, point, replication)
     ):

@@ -42,7 +42,15 @@ def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: i
     if len(manifest.points) > 1:
         point = cell.point
     policy = manifest.policies[cell.team].policy
-    return command_line("simulate", of=folder, point=point, policy=policy, replication=replication)
+    process = [identity.process for identity in manifest.processes]
+    return command_line(
+        "simulate",
+        of=folder,
+        point=point,
+        policy=policy,
+        process=process,
+        replication=replication,
+    )
 
 
 def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: int) -> str:
@@ -66,7 +74,8 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
     settings = {key: toml_value(value) for key, value in dotted(changes).items()}
     acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
-    which = {"policy": acting, "seed": origin.seed, "replication": replication}
+    which: dict[str, Any] = {"policy": acting, "seed": origin.seed, "replication": replication}
+    which["process"] = [identity.process for identity in origin.processes]
     return command_line("simulate", scenario=name, set=settings, **which)
 
 

@@ -1,7 +1,7 @@
 """What a fleet costs: the prices of a study, and the cost of its missions by what is paid for."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -162,37 +162,6 @@ class Costs(StrictTable):
         return self.days or self.missions
 
     @property
-    def in_words(self) -> str:
-        """The prices, the missions that are paid for, and what has no price."""
-        return self._words_with([], ())
-
-    def _words_with(self, of_types: Sequence[str], unused: Collection[str]) -> str:
-        """The same with the prices of types of UAVs, and without those that no scenario uses."""
-        paid = [*of_types]
-        free = []
-        for price, thing in _PAID_FOR.items():
-            if price in unused:
-                continue
-            value = getattr(self, price)
-            is_of_a_year = price in _OF_A_YEAR
-            if price == "lost_uav" and value is None and self.pays_for_losses:
-                continue
-            if value:
-                paid.append(f"{numbers.format_money(value, self.currency)} for {thing}")
-            elif self.years is not None or not is_of_a_year:
-                free.append(thing)
-        text = f"Prices: {numbers.join_words(paid)}."
-        if self.years is not None:
-            text += f" {self._year_in_words}"
-        elif self.pays_for_missions:
-            text += f" The fleet is to make {numbers.format_count(self.missions, 'mission')}."
-        if free:
-            text += f" Nothing is paid for {numbers.join_words(free, 'or')}."
-        if self.lost_uav is None and self.pays_for_losses:
-            text += " A lost UAV costs what it was bought for."
-        return text
-
-    @property
     def annuity_in_words(self) -> str:
         """Over how many years UAVs and pads are paid off, and at what interest."""
         years = self.years or 0.0
@@ -201,33 +170,30 @@ class Costs(StrictTable):
             f"{100 * self.interest:g} % interest"
         )
 
-    @property
-    def _year_in_words(self) -> str:
-        """How UAVs, pads and packs are paid for in a year, and its missions."""
-        text = (
-            f"{self.annuity_in_words}; "
-            f"the fleet makes {numbers.format_count(self.paid_missions, 'mission')} a year."
-        )
-        if self.pack:
-            text += f" A pack is worn after {self.pack_cycles:g} full charges."
-        return text
-
-    def words_on(self, spaces: Sequence[ScenarioSpace]) -> str:
-        """The prices in words, with those of the types of UAVs of a study.
+    def amounts_on(self, spaces: Sequence[ScenarioSpace]) -> dict[str, str]:
+        """What everything that may have a price costs, in words; empty if nothing is paid for it.
 
         Args:
-            spaces: The scenario of every design point.
+            spaces: The scenario of every design point; their types of UAVs may have prices.
         """
-        of_types = {
-            f"{numbers.format_money(kind.price, self.currency)} for a UAV of type {number}": None
+        amounts = {
+            f"a UAV of type {number}": numbers.format_money(kind.price, self.currency)
             for space in spaces
             for number, kind in enumerate(space.fleet, 1)
             if kind.price is not None
         }
-        unused: tuple[str, ...] = ()
-        if all(_prices_all_uavs(space) for space in spaces):
-            unused = ("uav",)
-        return self._words_with([*of_types], unused)
+        for price, thing in _PAID_FOR.items():
+            value = getattr(self, price)
+            is_of_types = price == "uav" and all(_prices_all_uavs(space) for space in spaces)
+            is_of_a_year = price in _OF_A_YEAR
+            if is_of_types or (is_of_a_year and self.years is None):
+                continue
+            amounts[thing] = ""
+            if value:
+                amounts[thing] = numbers.format_money(value, self.currency)
+            elif price == "lost_uav" and self.pays_for_losses:
+                amounts[thing] = "what it was bought for"
+        return amounts
 
     def price_of_uavs(self, space: ScenarioSpace, uavs: int) -> float:
         """What the first UAVs of a scenario cost; the price of a type replaces ``uav``."""

@@ -55,22 +55,28 @@ from dess.scenario.scenario import (
 Engine = Literal["batch", "events"]
 
 
-def engine_of(spaces: Sequence[ScenarioSpace], asked: Engine | None = None) -> Engine:
+def engine_of(
+    spaces: Sequence[ScenarioSpace], asked: Engine | None = None, processes: Sequence[str] = ()
+) -> Engine:
     """The engine for missions of some scenarios: the one that was asked for, or the fastest.
 
     Args:
         spaces: The scenarios.
         asked: The engine that was asked for, if any.
+        processes: The processes of the user in every mission.
 
     Raises:
-        InputError: If the batch engine was asked for, and one of the scenarios needs the other.
+        InputError: If the batch engine was asked for, and one of the scenarios or a process needs
+            the other.
     """
     if asked is None:
-        if any(space.needs_events for space in spaces):
+        if processes or any(space.needs_events for space in spaces):
             return "events"
         return "batch"
     if asked == "batch":
         check_slotted(spaces)
+        if processes:
+            raise InputError("engine", "batch runs no processes", "events")
     return asked
 
 
@@ -194,15 +200,22 @@ class Study(StudyData):
 
     _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
     _run_files: bool = PrivateAttr(False)
+    _processes: tuple[str, ...] = PrivateAttr(())
 
     @property
     def run_files(self) -> bool:
         """Whether Python files may be run as its policies, since a user has typed them."""
         return self._run_files
 
+    @property
+    def processes(self) -> tuple[str, ...]:
+        """Processes of Python files in every mission; a user has typed them, no data names any."""
+        return self._processes
+
     def model_post_init(self, context: Any) -> None:
-        """Keep whether Python files may be run, which is no part of the data."""
+        """Keep what a user has typed: processes, and whether files of policies may be run."""
         self._run_files = _may_run_files(context)
+        self._processes = tuple(context["processes"]) if context else ()
 
     @field_validator("policies")
     @classmethod
@@ -227,6 +240,8 @@ class Study(StudyData):
         self._check_budget()
         self._check_teams()
         if self.bounds:
+            if self.processes:
+                raise InputError("bounds", "are of missions without processes", "either")
             for space in self.scenarios:
                 check_scenario(space)
         return self
@@ -249,7 +264,8 @@ class Study(StudyData):
         if "engine" in self.model_fields_set:
             asked = self.engine
         # The model is frozen, and this is a part of its making.
-        object.__setattr__(self, "engine", engine_of(self.scenarios, asked))
+        engine = engine_of(self.scenarios, asked, self.processes)
+        object.__setattr__(self, "engine", engine)
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:
@@ -317,6 +333,7 @@ class Study(StudyData):
         """The command that runs the study in a folder, if it was read by ``load_study``."""
         name, changes = self._origin
         given = {"policy": changes.get("policies"), "missions": changes.get("missions")}
+        given["process"] = self.processes
         return command_line("study", "run", name or self.name, **given, out=out)
 
     @cached_property
@@ -396,29 +413,36 @@ def _may_run_files(context: dict[str, Any] | None) -> bool:
     return bool(context and context["run_files"])
 
 
-def study_from(data: Mapping[str, Any], what: str, *, run_files: bool = False) -> Study:
+def study_from(
+    data: Mapping[str, Any], what: str, *, run_files: bool = False, processes: Sequence[str] = ()
+) -> Study:
     """The study with these fields.
 
     Args:
         data: The fields.
         what: What the fields are of, for messages.
         run_files: Whether Python files may be run as policies, since a user has typed them.
+        processes: Processes of Python files, which a user has typed.
 
     Raises:
         InputError: If they are not valid; ``what`` is named before the reason.
     """
     try:
-        return Study.model_validate(data, context={"run_files": run_files})
+        context = {"run_files": run_files, "processes": processes}
+        return Study.model_validate(data, context=context)
     except ValidationError as error:
         raise to_input_error(error, what, Study) from None
 
 
-def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
+def load_study(
+    name_or_path: str | Path, /, *, processes: Sequence[str] = (), **overrides: Any
+) -> Study:
     """A shipped study by name, or one from a TOML file.
 
     Args:
         name_or_path: One of ``study_names()``, or the path of a TOML file. If the file gives no
             name, the study is named after the file. A scenario file is looked for in its folder.
+        processes: Further processes of every mission, ``FILE.py:FUNCTION`` each.
         **overrides: Fields of ``Study`` that replace those of the file. If ``missions`` is less
             than ``logged``, ``logged`` is reduced to it.
 
@@ -438,7 +462,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         raise unknown_name(f"{where}: {unknown[0]}", "unknown key", unknown[0], Study.model_fields)
-    study = study_from(values, where, run_files="policies" in overrides)
+    study = study_from(values, where, run_files="policies" in overrides, processes=processes)
     study._origin = (text, overrides)
     return study
 

@@ -24,7 +24,7 @@ from dess.analysis.stats.sequences import SEQUENCE
 from dess.analysis.study.prices import Costs, full_packs_of, has_priced_types
 from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
 from dess.base.errors import InputError
-from dess.model.channel import empty_scratch, make_world
+from dess.model.channel import Site, empty_scratch, make_world
 from dess.model.record import empty_records
 from dess.model.state import (
     MISSION,
@@ -217,7 +217,7 @@ def _arrays_of(
     """All arrays by name, for fleets of at most that many UAVs."""
     state = state_of([space], 1)
     starts = starts_of([space], seed)
-    world = make_world(space)
+    world = make_world(Site.of(space))
     chart = world.chart
     scratch = empty_scratch(fleet, len(space.nodes))
     records = empty_records(missions, fleet, is_extended=True)

@@ -12,7 +12,6 @@ order of the missions nor on how they are divided into batches.
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from itertools import groupby
 from threading import Event
 from typing import Any
 
@@ -21,7 +20,7 @@ import numpy as np
 from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model import rules
-from dess.model.channel import empty_scratch, world_of
+from dess.model.channel import Site, empty_scratch, world_of
 from dess.model.record import Records, empty_records_of, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
@@ -145,22 +144,14 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
 
 
 def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
-    """The indices of the scenarios, grouped by the constants that a batch must share."""
-
-    def key(index: int) -> tuple:
-        s = spaces[index]
-        radio = (s.radio.anchor, s.radio.range)
-        channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude, radio)
-        speeds = tuple(kind.slots_per_cell for kind in s.fleet)
-        has_costs = s.wind.blows or s.consumption.is_on
-        geometry = (s.size, s.rectangles, s.no_fly, s.nodes)
-        return (s.is_extended, geometry, s.communication_slots, channel, speeds, has_costs)
-
-    groups = []
-    ordered = sorted(range(len(spaces)), key=key)
-    for _, members in groupby(ordered, key):
-        groups += _by_energy(spaces, sorted(members))
-    return groups
+    """The indices of the scenarios, grouped by what a batch must share."""
+    groups: dict[tuple, list[int]] = {}
+    for member, space in enumerate(spaces):
+        # The return guard needs tables of ways in none of them or in all.
+        has_costs = space.wind.blows or space.consumption.is_on
+        key = (Site.of(space), space.is_extended, has_costs)
+        groups.setdefault(key, []).append(member)
+    return [part for members in groups.values() for part in _by_energy(spaces, members)]
 
 
 def _by_energy(spaces: list[ScenarioSpace], members: list[int]) -> list[np.ndarray]:

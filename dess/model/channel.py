@@ -17,7 +17,7 @@ from dess.base.elementary import exp, hypot, log1p, log10
 from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
-from dess.physics.chart import Chart, read_only
+from dess.physics.chart import Cell, Chart, chart_at, read_only
 from dess.physics.radio import has_max_rate, has_steps, step_efficiency
 from dess.scenario.fields import Fields
 from dess.scenario.scenario import ScenarioSpace
@@ -39,6 +39,70 @@ BATCH = np.dtype(
         ("rest", np.float64),  # highest mean SNR in the slot of all nodes behind these [dB]
     ]
 )
+
+
+class Link(NamedTuple):
+    """The link budget: all on which the mean SNR at a distance depends.
+
+    Attributes:
+        edge_snr: The mean SNR at ``snr_distance`` [dB].
+        snr_distance: The distance at which it holds [m].
+        path_loss_exponent: The exponent of the path loss.
+        altitude: The altitude of the UAVs [m].
+        range: The distance beyond which there is no service [m], 0 for none.
+    """
+
+    edge_snr: float
+    snr_distance: float
+    path_loss_exponent: float
+    altitude: float
+    range: float
+
+    @classmethod
+    def of(cls, scenario: Fields) -> "Link":
+        """The link budget of a scenario."""
+        return cls(
+            scenario.edge_snr,
+            scenario.snr_distance,
+            scenario.path_loss_exponent,
+            scenario.altitude,
+            scenario.radio.range,
+        )
+
+
+class Site(NamedTuple):
+    """All that a world is made of; scenarios with equal sites share one.
+
+    Attributes:
+        geometry: What their chart is made of.
+        nodes: The cells of the sensor nodes.
+        cell_size: The side of a cell [m].
+        communication_slots: The communication slots of a mission slot.
+        places, legs: What the speeds of the fleet ask for (``fleet.places_per_slot``,
+            ``fleet.legs``).
+        link: The link budget.
+    """
+
+    geometry: tuple[Any, ...]
+    nodes: tuple[Cell, ...]
+    cell_size: float
+    communication_slots: int
+    places: int
+    legs: int
+    link: Link
+
+    @classmethod
+    def of(cls, scenario: Fields) -> "Site":
+        """The site of a scenario."""
+        return cls(
+            scenario.geometry,
+            scenario.nodes,
+            scenario.cell_size,
+            scenario.communication_slots,
+            fleet.places_per_slot(scenario.fleet),
+            fleet.legs(scenario.fleet),
+            Link.of(scenario),
+        )
 
 
 class World(NamedTuple):
@@ -128,37 +192,37 @@ def world_of(scenario: ScenarioSpace) -> World:
 
     Every thread has its own tables, because each thread fills them row by row while it simulates.
     """
-    return _world_of(scenario, get_ident())
+    return _world_of(Site.of(scenario), get_ident())
 
 
 @lru_cache(maxsize=8)
-def _world_of(scenario: ScenarioSpace, thread: int) -> World:
-    return make_world(scenario)
+def _world_of(site: Site, thread: int) -> World:
+    return make_world(site)
 
 
-def make_world(scenario: ScenarioSpace) -> World:
-    """As ``world_of``, but new; it is not kept for the next mission of the scenario."""
-    m, (columns, rows) = scenario.communication_slots, scenario.size
-    places = m * fleet.places_per_slot(scenario.fleet)
-    steps = 5 * columns * rows * fleet.legs(scenario.fleet)
-    longest = max(columns, rows)
+def make_world(site: Site) -> World:
+    """The world of a site, new: it is not kept for the next mission."""
+    chart = chart_at(*site.geometry)
+    m = site.communication_slots
+    places = m * site.places
+    steps = 5 * chart.zones.size * site.legs
+    longest = max(chart.zones.shape)
     fine = np.arange(places * (longest - 1) + 1)
     mean_snr = np.empty((longest, len(fine)))
     for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         # From an integer: at equal distances, the SNR is equal to the bit.
         coarse = places * row
         squares = coarse * coarse + fine * fine
-        mean_snr[row] = mean_snr_at(scenario, scenario.cell_size * (np.sqrt(squares) / places))
-    nodes = np.array(scenario.nodes, np.int64)
-    return World.of(nodes, mean_snr, scenario.chart, steps, m)
+        mean_snr[row] = mean_snr_at(site.link, site.cell_size * (np.sqrt(squares) / places))
+    return World.of(np.array(site.nodes, np.int64), mean_snr, chart, steps, m)
 
 
-def mean_snr_at(scenario: Fields, horizontal: np.ndarray) -> np.ndarray:
+def mean_snr_at(link: Link, horizontal: np.ndarray) -> np.ndarray:
     """The mean SNR [dB] at horizontal distances [m], minus infinity out of range (eq. 10)."""
-    distance = hypot(horizontal, scenario.altitude)
-    loss = 10 * scenario.path_loss_exponent * log10(distance / scenario.snr_distance)
-    reach = scenario.radio.range or math.inf
-    return np.where(distance <= reach, scenario.edge_snr - loss, -math.inf)
+    distance = hypot(horizontal, link.altitude)
+    loss = 10 * link.path_loss_exponent * log10(distance / link.snr_distance)
+    reach = link.range or math.inf
+    return np.where(distance <= reach, link.edge_snr - loss, -math.inf)
 
 
 @shared_kernel

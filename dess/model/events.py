@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dess.base.errors import InputError, shown
 from dess.model.state import BATTERY, LANDED, LOST, QUOTA, State
 from dess.physics import fleet
 
@@ -60,6 +61,18 @@ EVENT_NAMES = (
     *("communication", "arrival", "quota_filled", "battery_empty", "landing"),
     *(*FAILURE_EVENTS, *PACKET_EVENTS, "remainder", "mission_end"),
 )
+
+
+def check_own_event(name: str) -> None:
+    """Refuse a name that is no name, or that of an event of the model.
+
+    Raises:
+        InputError: If it is one.
+    """
+    if name in EVENT_NAMES:
+        raise InputError("event", f"{name} is an event of the model", "another name")
+    if not name.isidentifier():
+        raise InputError("event", f"{shown(name)} is no name", "letters, digits and _")
 
 
 class EventLog(list[Event]):
@@ -127,6 +140,9 @@ class Listener:
         self, event: str, time: float, number: int, node: int, uav: int, value: float, born: float
     ) -> None:
         """A packet arrives, is delivered to a UAV or is lost; it was generated at ``born``."""
+
+    def note_own(self, time: float, event: str, value: float, **columns: Any) -> None:
+        """A process of the user tells something; ``columns`` are those of ``Event``."""
 
     def note_end(self) -> None:
         """The mission ends."""
@@ -254,6 +270,10 @@ class LogWriter(Listener):
         x, y = self._nodes[node]
         battery = self._uavs[uav]["battery"] if uav >= 0 else -1
         self.log.add(time, event, uav, node, value, x, y, battery, packet=number, generated=born)
+
+    def note_own(self, time: float, event: str, value: float, **columns: Any) -> None:
+        """Log what a process of the user tells."""
+        self.log.append(Event(time, event, -1, -1, value)._replace(**columns))
 
     @property
     def _slot(self) -> int:

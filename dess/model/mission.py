@@ -15,9 +15,11 @@ mission slots. The processes of a mission are:
 - the *failures* strike UAVs, pads and nodes; each *pad* has a process that holds it while it is out
   of order.
 
-A charging zone is a ``simpy.PriorityResource``, and its pads are the capacity of the resource.
-SimPy counts the pads in use; which pad a UAV stands on is known to the rules. A ``Signal`` is an
-event that happens again and again.
+Further processes are functions of the mission (``simulate``, ``processes``), such as a supply boat.
+
+A charging zone is a ``BatteryQueue``, and its pads are the capacity of this resource. SimPy counts
+the pads in use; which pad a UAV stands on is known to the rules. A ``Signal`` is an event that
+happens again and again.
 
 Slot t, from the time t to the time t + 1, is:
 
@@ -33,19 +35,20 @@ where data arrive in continuous time, each packet has a time of its own.
 ``docs/concepts/processes.md`` shows the lines that matter.
 """
 
-from collections.abc import Sequence
-from math import inf
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import inf, nan
+from typing import Any, TypeAlias
 
 import numpy as np
 import simpy
-from simpy.events import ProcessGenerator
+from simpy.events import NORMAL, EventPriority, ProcessGenerator
 from simpy.resources.resource import PriorityRequest, Request
 
+from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model import channel, rules
 from dess.model.channel import empty_scratch, world_of
-from dess.model.events import Listener, LogWriter
+from dess.model.events import Listener, LogWriter, check_own_event
 from dess.model.packets import Packets
 from dess.model.record import MissionRecord, empty_records_of, write_records
 from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
@@ -60,8 +63,11 @@ from dess.scenario.scenario import AnyScenario, ScenarioSpace
 # Why a UAV is interrupted: while it waits in a queue, or while it is on a pad.
 CALLED_AWAY = "it no longer wants a pad"
 PAD_FAILED = "its pad has failed"
-# The priority of a pad that has failed, in the queue of its zone.
+# Priorities in the queue of a zone, of whoever is no UAV; a pad that has failed comes first.
 BEFORE_ALL_UAVS: Any = (-inf,)
+AFTER_ALL_UAVS: Any = (inf,)
+# SimPy orders the events of one time by their priorities.
+AFTER_ALL_EVENTS = EventPriority(NORMAL + 1)
 
 
 def simulate(
@@ -71,6 +77,7 @@ def simulate(
     replication: int = 0,
     *,
     events: bool = False,
+    processes: Sequence["Process"] = (),
 ) -> MissionRecord:
     """Simulate one mission with the SimPy model.
 
@@ -81,18 +88,22 @@ def simulate(
         seed: Seed of the study.
         replication: Number of the replication.
         events: Whether to keep the event log.
+        processes: Further processes, functions of the ``Mission`` that yield SimPy events.
 
     Returns:
         The record of the mission.
 
     Raises:
         InputError: If the seed or the replication is out of range, or if the team has more policies
-            than the largest fleet has UAVs; if there is no scenario of a name.
+            than the largest fleet has UAVs; if there is no scenario of a name, or a process yields
+            nothing.
         ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)
     space = spaces_of([scenario])[0]
-    return Mission(space, team_of(policy, [space]), seed, replication, events=events).run()
+    team = team_of(policy, [space])
+    mission = Mission(space, team, seed, replication, events=events, processes=processes)
+    return mission.run()
 
 
 class Signal:
@@ -117,6 +128,37 @@ class Signal:
         event.succeed(value)
 
 
+class EndOfTime(simpy.Event):
+    """Happens when nothing else is due any more at the present time.
+
+    All that follows at this time from what is due, from zero delays too, has happened then.
+    """
+
+    def __init__(self, env: simpy.Environment):
+        super().__init__(env)
+        self._ok = True
+        self._value = None
+        env.schedule(self, AFTER_ALL_EVENTS)
+
+
+class BatteryQueue(simpy.PriorityResource):
+    """The pads of a charging zone, and the queue of those who wait for one of them.
+
+    The priority of a UAV is its ``queue_key``; others come before or after all of them.
+    """
+
+    def request(self, priority: Any = AFTER_ALL_UAVS, preempt: bool = False) -> PriorityRequest:
+        """Ask for a pad; who has the lowest priority is given the next one."""
+        return PriorityRequest(self, priority, preempt)
+
+    def reorder(self, priorities: Mapping[simpy.Process, Any]) -> None:
+        """Sort those who wait, some of whom have other priorities now."""
+        for request in self.queue:
+            if request.proc in priorities:
+                request.key = (priorities[request.proc], *request.key[1:])
+        self.queue[:] = sorted(self.queue, key=lambda request: request.key)
+
+
 class Mission:
     """The SimPy model of one mission.
 
@@ -131,6 +173,7 @@ class Mission:
         uav_processes: The processes of the UAVs.
         packets: The packets, where data arrive in continuous time.
         listener: Is told what happens; it may write the event log.
+        further: The processes of the user.
     """
 
     def __init__(
@@ -141,6 +184,7 @@ class Mission:
         replication: int,
         *,
         events: bool = False,
+        processes: Sequence["Process"] = (),
     ):
         self.scenario = scenario
         self.policies = policies
@@ -159,13 +203,14 @@ class Mission:
         self.arrivals = np.zeros(len(scenario.nodes))
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.listener = LogWriter(self.state, self.world.nodes) if events else Listener()
+        self.further = processes
         self.packets: Packets | None = None
         if scenario.needs_events:
             self.packets = Packets(scenario, self.state, self.listener)
 
         # The zones, and what the processes wait for.
         self.env = simpy.Environment()
-        self.zones = [simpy.PriorityResource(self.env, pads) for pads in scenario.zone_pads]
+        self.zones = [BatteryQueue(self.env, pads) for pads in scenario.zone_pads]
         self.queues_change = may_change_order(self.mission)
         self.zone_of_pad = [zone for zone in self.zones for _ in range(int(zone.capacity))]
         self.uav_processes: list[simpy.Process] = []
@@ -177,29 +222,47 @@ class Mission:
         self.slot_closes = Signal(self.env)
         self.repaired_pads_return = Signal(self.env)
         self.pad_fails: list[Signal] = []
+        if self.mission["pad_rate"] > 0:
+            self.pad_fails = [Signal(self.env) for _ in self.zone_of_pad]
 
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
-        env = self.env
-        # The clock comes last: when it sends its first signal, all others wait for theirs.
-        self.uav_processes = [env.process(self.run_uav(uav)) for uav in self.fleet]
-        env.process(self.run_radio())
-        if self.packets is None:
-            env.process(self.bring_data())
-        else:
-            env.process(self.bring_packets(self.packets))
-        if self.mission["has_failures"]:
-            env.process(self.run_failures())
-        if self.mission["pad_rate"] > 0:
-            self.pad_fails = [Signal(env) for _ in self.zone_of_pad]
-            for pad, zone in enumerate(self.zone_of_pad):
-                env.process(self.run_pad(pad, zone))
-        clock = env.process(self.run_clock())
-
         self.listener.note_start(self.packets.initial_packets() if self.packets else {})
-        env.run(until=clock)
+        self.uav_processes = [self.env.process(self.run_uav(uav)) for uav in self.fleet]
+        for process in self.list_processes():
+            self.env.process(process)
+        # The clock comes last: when it sends its first signal, all others wait for theirs.
+        self.env.run(until=self.env.process(self.run_clock()))
         self.listener.note_end()
         return self.write_record()
+
+    def list_processes(self) -> Iterator[ProcessGenerator]:
+        """The processes of the mission beside its UAVs and its clock, in their order."""
+        yield self.run_radio()
+        if self.packets is None:
+            yield self.bring_data()
+        else:
+            yield self.bring_packets(self.packets)
+        if self.mission["has_failures"]:
+            yield self.run_failures()
+        for pad in range(len(self.pad_fails)):
+            yield self.run_pad(pad, self.zone_of_pad[pad])
+        for process in self.further:
+            yield _started(process, self)
+
+    def log(self, event: str, value: float = nan, **columns: Any) -> None:
+        """Write a row of a process of the user into the event log, if the mission keeps one.
+
+        Args:
+            event: What happens, in a name that no event of dess has.
+            value: A number that tells more.
+            **columns: Other columns of ``dess.model.events.Event``.
+
+        Raises:
+            InputError: If the name is one of dess.
+        """
+        check_own_event(event)
+        self.listener.note_own(self.env.now, event, value, **columns)
 
     # --- the clock ---
 
@@ -218,13 +281,9 @@ class Mission:
             yield from self.announce(self.slot_closes)
 
     def announce(self, signal: Signal) -> ProcessGenerator:
-        """Send a signal, and wait until all else that is due at this time has happened.
-
-        Only the clock may do so: two processes that wait for each other like this never end.
-        """
+        """Send a signal, and wait until all else that is due at this time has happened."""
         signal.send()
-        while self.env.peek() <= self.env.now:
-            yield self.env.timeout(0)
+        yield EndOfTime(self.env)
 
     def decide_moves(self) -> None:
         """Let the policies decide for all UAVs together, and the safety controller move them.
@@ -260,15 +319,11 @@ class Mission:
         yield from self.announce(self.repaired_pads_return)
 
     def sort_queues(self) -> None:
-        """Bring those who wait for pads into the order of this slot."""
-        for uav in self.fleet:
-            if self.waits_for_pad(uav):
-                request = self.uav_processes[uav].target
-                assert isinstance(request, PriorityRequest)
-                key: Any = (self.queue_key_of(uav), *request.key[1:])  # SimPy expects an integer
-                request.key = key
+        """Bring the UAVs that wait for pads into the order of this slot."""
+        waiting = filter(self.waits_for_pad, self.fleet)
+        priorities = {self.uav_processes[uav]: self.queue_key_of(uav) for uav in waiting}
         for zone in self.zones:
-            zone.queue[:] = sorted(zone.queue, key=lambda request: request.key)
+            zone.reorder(priorities)
 
     def update_batteries(self) -> None:
         """Charge and discharge the batteries for this slot, and prepare the search of the radio."""
@@ -415,7 +470,7 @@ class Mission:
         for pad in np.nonzero(self.mission["pads_out"] > were_out)[0].tolist():
             self.pad_fails[pad].send(uav_on.get(pad))
 
-    def run_pad(self, pad: int, zone: simpy.PriorityResource) -> ProcessGenerator:
+    def run_pad(self, pad: int, zone: BatteryQueue) -> ProcessGenerator:
         """A pad: from when it fails until it is repaired, it takes a place of its zone.
 
         It asks before the UAV on it leaves, so that no other UAV is given that place.
@@ -436,6 +491,23 @@ class Mission:
         if self.packets is not None:
             self.packets.write(records.operations[0])
         return records.mission(0, self.listener.log)
+
+
+# A process of a user, such as a boat that takes a pad.
+Process: TypeAlias = Callable[[Mission], ProcessGenerator]
+
+
+def _started(process: Process, mission: Mission) -> ProcessGenerator:
+    """A process of a user as SimPy takes it.
+
+    Raises:
+        InputError: If it yields nothing.
+    """
+    generator = process(mission)
+    if not hasattr(generator, "throw"):
+        name = getattr(process, "__name__", shown(process))
+        raise InputError("processes", f"{name} yields nothing", "a function that yields events")
+    return generator
 
 
 # For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state,

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.model.channel import mean_snr_at
+from dess.model.channel import Link, mean_snr_at
 from dess.model.guard.battery import margin
 from dess.model.state import constants_of, types_of
 from dess.model.ways import FAR as WAYS_FAR
 from dess.model.ways import move_costs, relax
 from dess.physics import fleet
-from dess.physics.chart import FAR, parking_of, read_only, spread, zones_of
+from dess.physics.chart import FAR, Cell, parking_of, read_only, spread, zones_of
 from dess.physics.energy import ACTIONS, HOVERING, PERCENT, waiting_slot
 from dess.scenario.scenario import ScenarioSpace
 
@@ -103,22 +103,31 @@ def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
 
 def in_range(space: ScenarioSpace, node: int) -> np.ndarray:
     """(H, W) whether a node is in range of a UAV in a cell, by its mean SNR."""
-    columns, rows = space.size
-    x, y = space.nodes[node]
-    about = _in_range_about(space)
+    return _window(_in_range_about(space), space.nodes[node])
+
+
+def _window(about: np.ndarray, node: Cell) -> np.ndarray:
+    """(H, W) what a table by the place of a UAV about a node has for the cells of the grid."""
+    rows, columns = (np.array(about.shape) + 1) // 2
+    x, y = node
     return about[rows - 1 - y : 2 * rows - 1 - y, columns - 1 - x : 2 * columns - 1 - x]
 
 
-@lru_cache(maxsize=8)
 def _in_range_about(space: ScenarioSpace) -> np.ndarray:
     """(2 H - 1, 2 W - 1) whether a node is in range, by where the UAV is about it."""
-    columns, rows = space.size
-    across = np.arange(1 - columns, columns)
-    down = np.arange(1 - rows, rows)[:, None]
-    snr = mean_snr_at(space, space.cell_size * np.sqrt(across * across + down * down))
     least = -math.inf
     if space.radio.steps:
         least = space.radio.steps[0][0]
+    return _in_range_of(Link.of(space), space.cell_size, space.size, least)
+
+
+@lru_cache(maxsize=8)
+def _in_range_of(link: Link, cell_size: float, size: tuple[int, int], least: float) -> np.ndarray:
+    """As ``_in_range_about``, for an SNR that is high enough."""
+    columns, rows = size
+    across = np.arange(1 - columns, columns)
+    down = np.arange(1 - rows, rows)[:, None]
+    snr = mean_snr_at(link, cell_size * np.sqrt(across * across + down * down))
     return read_only((snr > -math.inf) & (snr >= least))
 
 
@@ -128,7 +137,9 @@ def _has_limit(space: ScenarioSpace) -> bool:
 
 def _served(space: ScenarioSpace, is_reached: np.ndarray) -> set[int]:
     """The nodes that are in range of some of these cells."""
-    return {k for k in range(len(space.nodes)) if (is_reached & in_range(space, k)).any()}
+    about = _in_range_about(space)
+    nodes = enumerate(space.nodes)
+    return {k for k, node in nodes if (is_reached & _window(about, node)).any()}
 
 
 def _cheapest(zones: np.ndarray, moves: np.ndarray, outward: bool) -> np.ndarray:

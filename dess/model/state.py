@@ -11,6 +11,7 @@ from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 
 from dess.base.errors import InputError, check_type
 from dess.base.kernels import kernel
@@ -110,6 +111,19 @@ PLAIN_MISSION = np.dtype(
     [("is_plain", *field[1:]) if field[0] == "is_extended" else field for field in MISSION.descr],
     align=True,
 )
+
+
+def mission_part(*names: str) -> np.dtype:
+    """The type of records that have these fields of ``MISSION`` and no others.
+
+    A table that missions share is computed from such records and kept by their bytes. So it cannot
+    depend on a field that is not in its key: a function that reads one does not compile.
+    """
+    return repack_fields(MISSION[[*names]])
+
+
+# What the tables of ``dess.model.ways`` are computed from.
+ENERGY_PART = mission_part(*ENERGY)
 
 # One UAV: its state and the outcome of the present slot.
 UAV = np.dtype(
@@ -211,6 +225,11 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
     return _constants_of(scenario).copy()
 
 
+def part_of(missions: np.ndarray, kind: np.dtype) -> np.ndarray:
+    """A part of ``MISSION`` records."""
+    return missions[[*(kind.names or ())]].astype(kind)
+
+
 @lru_cache(maxsize=8)
 def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
     low, high = np.transpose(scenario.node_data)
@@ -310,10 +329,9 @@ def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
 
 def _number_energies(constants: np.ndarray) -> None:
     """Number the different energies of scenarios, in the order in which they come."""
-    numbers: dict[tuple[bytes, ...], int] = {}
-    for mission in constants:
-        key = tuple(mission[name].tobytes() for name in ENERGY)
-        mission["energy"] = numbers.setdefault(key, len(numbers))
+    numbers: dict[bytes, int] = {}
+    for mission, energy in zip(constants, part_of(constants, ENERGY_PART), strict=True):
+        mission["energy"] = numbers.setdefault(energy.tobytes(), len(numbers))
 
 
 @kernel

@@ -4,7 +4,7 @@ view = View(state, world, mission, uav)   # one row per UAV that must act
 view.own["battery"], view.residual, view.legal
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model.channel import World
 from dess.model.rules import legal_moves, may_act
-from dess.model.state import HOVER, State
+from dess.model.state import HOVER, State, part_of
 from dess.model.ways import Ways
 from dess.scenario.scenario import ScenarioSpace
 
@@ -98,6 +98,21 @@ class View:
         """(R,) charging pads that are not out of order."""
         constants = self.constants
         return constants["pads"] - constants["pads_out"].sum(1)
+
+    def rows_by(self, kind: np.dtype) -> Iterator[tuple[bytes, np.ndarray]]:
+        """The rows of missions that are equal in a part, with that part as bytes.
+
+        Args:
+            kind: The type of the part (``mission_part``).
+        """
+        parts = part_of(self.state.missions, kind).view(np.dtype((np.void, kind.itemsize)))
+        numbers: dict[bytes, int] = {}
+        of_mission = np.array([numbers.setdefault(part, len(numbers)) for part in parts.tolist()])
+        of_row = of_mission[self.mission]
+        for part, number in numbers.items():
+            rows = np.flatnonzero(of_row == number)
+            if len(rows):
+                yield part, rows
 
     @cached_property
     def legal(self) -> np.ndarray:

@@ -17,9 +17,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from dess.base.kernels import inlined, kernel
-from dess.model.state import MISSION
+from dess.model.state import ENERGY_PART, part_of
 from dess.physics.chart import NO_FLY, Chart, read_only
-from dess.physics.energy import ACTIONS, ENERGY, HOVERING, fill_move_costs
+from dess.physics.energy import ACTIONS, HOVERING, fill_move_costs
 
 FAR = 2**30  # further than any cell
 MOST_ENTRIES = 2**25  # of the tables of a batch: 128 MB
@@ -75,19 +75,12 @@ class Ways:
         energies = self._missions["energy"]
         tables = []
         for number in range(int(energies.max()) + 1):
-            mission = self._missions[np.argmax(energies == number)]
-            tables.append(_filled(*sea, groups, slowest, _energy_of(mission)))
+            first = np.argmax(energies == number)
+            energy = part_of(self._missions[first : first + 1], ENERGY_PART)
+            tables.append(_filled(*sea, groups, slowest, energy.tobytes()))
         if len(tables) == 1:
             return tables[0][None]
         return read_only(np.stack(tables))
-
-
-def _energy_of(mission: np.void) -> bytes:
-    """A mission of which nothing is kept but what slots take."""
-    energy = np.zeros(1, MISSION)
-    for name in ("grid", *ENERGY):
-        energy[name] = mission[name]
-    return energy.tobytes()
 
 
 @lru_cache(maxsize=16)
@@ -98,7 +91,7 @@ def _filled(
     cells = np.frombuffer(zones, np.int8).reshape(shape)
     if groups * slowest * cells.size > MOST_ENTRIES:
         return read_only(np.zeros((groups, 0, 0, 0), np.int32))
-    mission = np.frombuffer(energy, MISSION)[0]
+    mission = np.frombuffer(energy, ENERGY_PART)[0]
     table = np.full((groups, slowest, *shape), FAR, np.int32)
     for s in range(slowest):
         moves = move_costs(mission, s + 1, shape)

@@ -76,10 +76,10 @@ def zones_of(
 ) -> np.ndarray:
     """``Chart.zones`` of zones and no-fly cells that lie on the grid."""
     cells = np.full((height, width), OPEN, np.int8)
-    for x, y in no_fly:
-        cells[y, x] = NO_FLY
-    for number, (x, y, columns, rows) in enumerate(zones):
-        cells[y : y + rows, x : x + columns] = number
+    x, y = np.array([*no_fly], np.int64).reshape(-1, 2).T
+    cells[y, x] = NO_FLY
+    for number, (left, top, columns, rows) in enumerate(zones):
+        cells[top : top + rows, left : left + columns] = number
     return cells
 
 

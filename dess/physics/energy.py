@@ -28,8 +28,8 @@ MOST_WIND = 10  # the largest surcharge of a move in the mean wind [%]
 SPEEDS = 8  # the most slots that a UAV takes for a cell (``dess.physics.fleet``)
 ACTIONS = 5  # north, east, south, west and hovering
 HOVERING = ACTIONS - 1
-# The fields of ``MISSION`` that tell what slots take; missions with equal ones share tables.
-ENERGY = ("slot_costs", "pushes", "gusts", "gust_seed")
+# The fields of ``MISSION`` that tell what slots take; ``slot_cost_at`` reads no others.
+ENERGY = ("grid", "slot_costs", "pushes", "gusts", "gust_seed")
 # What rounding may add to a cost [% / 1000]: a wind from the east is none from the north.
 _ROUNDING = 1e-6
 

@@ -89,9 +89,9 @@ def for_sections(function: Callable) -> Any:
     """
 
     def choose(mission: Any, *_: Any) -> Callable:
-        if "is_extended" in mission.fields:
-            return function
-        return _nothing
+        if "is_plain" in mission.fields:
+            return _nothing
+        return function
 
     return inlined(function, choose)
 

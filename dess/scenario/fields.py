@@ -300,12 +300,17 @@ class Fields(Strict):
         return (self.zone, *(zone.cells for zone in self.zones))
 
     @property
-    def chart(self) -> Chart:
-        """The zones, the no-fly cells and the ways between cells."""
+    def geometry(self) -> tuple[Any, ...]:
+        """The arguments of ``chart_at``: all that the chart is made of."""
         nodes: tuple[Cell, ...] = ()
         if self.size[0] * self.size[1] > MOST_CHARTED:
             nodes = self.nodes
-        return chart_at(*self.size, self.rectangles, self.no_fly, nodes)
+        return *self.size, self.rectangles, self.no_fly, nodes
+
+    @property
+    def chart(self) -> Chart:
+        """The zones, the no-fly cells and the ways between cells."""
+        return chart_at(*self.geometry)
 
     @property
     def aim(self) -> str:

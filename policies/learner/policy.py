@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from dess.base.errors import InputError
-from dess.envs.observations.sets import sea_constants, sea_kinds, sea_of
+from dess.envs.observations.sets import SEA_PART, sea_of
 from dess.envs.observations.states import Layout, compact_states, masks
 from dess.model.channel import World
 from dess.model.view import View
@@ -89,21 +89,18 @@ class LearnedPolicy:
                 self._world = view.world
             yield np.arange(len(view)), self.observation
             return
-        kinds = sea_kinds(view.state.missions)[view.mission]
-        for kind in np.unique(kinds) if kinds.any() else kinds[:1]:
-            of_kind = np.flatnonzero(kinds == kind)
-            mission = view.state.missions[view.mission[of_kind[0]]]
-            yield of_kind, self._encoder_of_sea(mission, view.world)
+        for part, rows in view.rows_by(SEA_PART):
+            yield rows, self._encoder_of_sea(part, view.world)
 
-    def _encoder_of_sea(self, mission: np.void, world: World) -> Any:
-        """The encoder of the sea of a mission; those of a world are kept for the next slots."""
+    def _encoder_of_sea(self, part: bytes, world: World) -> Any:
+        """The encoder of a sea; those of a world are kept for the next slots."""
         if self._world is not world:
             self._world = world
             self._encoders = {}
-        constants = sea_constants(mission)
-        if constants not in self._encoders:
-            self._encoders[constants] = self.observation(sea_of(mission, world))
-        return self._encoders[constants]
+        if part not in self._encoders:
+            mission = np.frombuffer(part, SEA_PART)[0]
+            self._encoders[part] = self.observation(sea_of(mission, world))
+        return self._encoders[part]
 
     def _require_layout(self, view: View, layout: Layout) -> None:
         learned = (layout.grid, *layout.zone)

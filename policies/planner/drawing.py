@@ -20,7 +20,7 @@ from dess.policies.planner.fluid import (
     simulate_flight,
 )
 from dess.policies.planner.policy import Planner, recall_plans
-from dess.policies.planner.rates import load_rates
+from dess.policies.planner.rates import RATES_PART, load_rates
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 
@@ -101,7 +101,8 @@ class _Watched:
 def _draw_courses(view: View, planner: Planner) -> list[Course]:
     """The courses of a planner's present plan for the mission of a view."""
     state = view.state
-    rates = load_rates(view)
+    part, _ = next(view.rows_by(RATES_PART))
+    rates = load_rates(view.world, part)
     mission = state.missions[0]
     uavs = state.uavs[0]
     residual = state.residual[0]

@@ -23,7 +23,7 @@ from dess.model.view import View
 from dess.physics.landing import lands
 from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
-from dess.policies.planner.rates import load_rates
+from dess.policies.planner.rates import RATES_PART, load_rates
 from dess.policies.planner.search import TRIED, empty_workspace, improve_plan
 
 # The temperature of the first step of a search [data units]: for a new plan, and for one that is
@@ -92,7 +92,6 @@ class Planner:
         """Choose the (R,) actions for the rows of the view."""
         state = view.state
         slots = int(state.missions["max_slots"].max())
-        rates = load_rates(view)
         safe = guard(view)
         memory = recall_plans(state, self.budget)
         fleet = state.uavs.shape[1]
@@ -100,13 +99,17 @@ class Planner:
         edits = max(_WORK // (min(slots, fluid.MOST_SLOTS) * fleet * (fleet + m)), 1)
         workspace = empty_workspace(slots, fleet, state.residual.shape[1])
         actions = np.empty(len(view), np.int64)
-        decided = 0
-        while decided < len(view):
-            decided = _choose_actions(
-                state.missions, state.uavs, state.residual, view.world.nodes, rates,
-                memory, workspace, view.mission, view.uav, safe, self.budget, actions, decided,
-                edits,
-            )  # fmt: skip
+        for part, rows in view.rows_by(RATES_PART):
+            rates = load_rates(view.world, part)
+            chosen = np.empty(len(rows), np.int64)
+            decided = 0
+            while decided < len(rows):
+                decided = _choose_actions(
+                    state.missions, state.uavs, state.residual, view.world.nodes, rates,
+                    memory, workspace, view.mission[rows], view.uav[rows], safe[rows],
+                    self.budget, chosen, decided, edits,
+                )  # fmt: skip
+            actions[rows] = chosen
         return actions
 
 

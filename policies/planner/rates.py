@@ -1,6 +1,6 @@
 """The mean rates at which UAVs collect data, in tables that the planner reads.
 
-tables = rates_of(view)
+tables = load_rates(view.world, radio)
 tables.candidates[row, 0]      # the node with the highest rate in a step
 
 A step is an action together with the cell that it leads to.
@@ -14,9 +14,8 @@ import numpy as np
 
 from dess.base.files.memory import check_memory
 from dess.base.kernels import kernel
-from dess.model.channel import efficiency
-from dess.model.state import MISSION, STEP_X, STEP_Y
-from dess.model.view import View
+from dess.model.channel import World, efficiency
+from dess.model.state import STEP_X, STEP_Y, mission_part
 from dess.physics.chart import Chart
 
 # Nodes kept per step. The farther ones give next to no data, and nothing is planned with them.
@@ -35,9 +34,9 @@ _RULE = (
 )
 
 
-# The fields of ``MISSION`` on which the rate at a mean SNR depends.
-_CHANNEL = (
-    *("communication_slot_length", "shadowing_deviation"),
+# What the rates are computed from, beside the world.
+RATES_PART = mission_part(
+    *("communication_slot_length", "shadowing_deviation", "slowest"),
     *("max_rate", "steps", "step_snr", "step_rate"),
 )
 
@@ -58,33 +57,31 @@ class Rates(NamedTuple):
     chart: Chart
 
 
-def load_rates(view: View) -> Rates:
-    """The tables of the sea that a view is about."""
-    mission = view.state.missions[0]
-    snr = view.world.mean_snr
-    chart = view.world.chart
-    rows, columns = chart.zones.shape
-    candidates = _rank_nodes(
-        view.world.nodes.tobytes(),
-        snr.tobytes(),
-        (columns, rows),
-        int(mission["communication_slots"]),
-        int(mission["slowest"]),
-        _channel_of(view.state.missions),
-    )
-    return Rates(candidates, chart)
+def load_rates(world: World, radio: bytes) -> Rates:
+    """The tables of missions in a world.
+
+    Args:
+        world: The nodes and the tables of the channel.
+        radio: Their ``RATES_PART``.
+    """
+    rows, columns = world.chart.zones.shape
+    nodes, snr = world.nodes.tobytes(), world.mean_snr.tobytes()
+    candidates = _rank_nodes(nodes, snr, (columns, rows), world.means.shape[2], radio)
+    return Rates(candidates, world.chart)
 
 
 @lru_cache(maxsize=8)
 def _rank_nodes(
-    nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, channel: bytes
-) -> np.ndarray:  # fmt: skip
+    nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, radio: bytes
+) -> np.ndarray:
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     snr = np.frombuffer(mean_snr)
     columns, rows = size
     longest = max(size)
-    rates = _mean_rate(snr.reshape(longest, -1), np.frombuffer(channel, MISSION))
+    constants = np.frombuffer(radio, RATES_PART)[0]
+    rates = _mean_rate(snr.reshape(longest, -1), constants)
     kept = min(_RANKS, len(cells))
+    slowest = int(constants["slowest"])
     legs = slowest * (slowest + 1) // 2
     check_memory(
         f"planner: a grid of {columns:,} x {rows:,} cells",
@@ -127,31 +124,23 @@ def _mean_rates_of_steps(
     return total / len(ahead)
 
 
-def _channel_of(missions: np.ndarray) -> bytes:
-    """The first mission, of which nothing is kept but what the rate depends on."""
-    channel = np.zeros(1, MISSION)
-    for name in _CHANNEL:
-        channel[name] = missions[name][:1]
-    return channel.tobytes()
-
-
-def _mean_rate(snr: np.ndarray, channel: np.ndarray) -> np.ndarray:
+def _mean_rate(snr: np.ndarray, constants: np.void) -> np.ndarray:
     """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB].
 
     It is computed once for each SNR, so that nodes at equal distances have equal rates.
     """
     distinct, places = np.unique(snr, return_inverse=True)
     rates = np.zeros(len(distinct))
-    _add_rates(distinct, channel[0], rates)
+    _add_rates(distinct, constants, rates)
     return rates[places].reshape(snr.shape)
 
 
 @kernel
-def _add_rates(snr, mission, rates):
+def _add_rates(snr, radio, rates):
     """Add the mean rate at each mean SNR [dB] to ``rates``."""
-    length = mission.communication_slot_length
+    length = radio.communication_slot_length
     for number in range(len(snr)):
         for point, weight in _RULE:
             for deviate in (-point, point):
-                level = snr[number] + mission.shadowing_deviation * deviate
-                rates[number] += length * weight * efficiency(mission, level)
+                level = snr[number] + radio.shadowing_deviation * deviate
+                rates[number] += length * weight * efficiency(radio, level)

@@ -4,6 +4,7 @@ import json
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,6 +77,7 @@ def sweep(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
+    from dess.analysis.ask.answer import settings_answer
     from dess.analysis.ask.question import sweep_question
 
     values = options.parse_all_values(settings or [])
@@ -96,16 +98,17 @@ def sweep(
     parameters = {}
     if metric:
         parameters["metric"] = question.measured_column(metric, "--metric")
-    answer = _answer_question(
-        question, f"{PREFIX}{question.study.name}", out, workers, dry_run, yes
-    )
+    page = f"{PREFIX}{question.study.name}"
+    found = _run_question(question, page, out, workers, dry_run, yes)
+    _ask_around(question, found, page, out, workers)
+    answer = settings_answer(found, question, parameters.get("metric"))
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
 
-        return render_study(answer.results, out, progress, parameters)
+        return render_study(found, out, progress, parameters)
 
-    _print_answer(answer, parameters.get("metric"), render, as_json, "sweep")
+    _print_answer(question, answer, render, as_json, "sweep")
 
 
 @options.add_command(app, WHAT_IF)
@@ -146,14 +149,15 @@ def what_if(
         out: Folder of the page.
         dry_run: Only print the plan and the range of its time.
     """
-    from dess.analysis.ask.answer import check_shown
+    from dess.analysis.ask.answer import VariationAnswer, check_shown
     from dess.analysis.ask.question import what_if_question
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
-    answer = _answer_question(question, WHAT_IF, out, workers, dry_run, yes)
+    found = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
+    answer = VariationAnswer(found, question, shown)
     parameters = {
         "settings": changes,
         "baseline": fixed,
@@ -170,24 +174,7 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    _print_answer(answer, None, render, as_json, "what-if question")
-
-
-def _answer_question(
-    question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
-) -> "Answer":
-    """Ask a question; of a cheapest fleet that it finds, also what one more brings, and limits."""
-    from dess.analysis.ask.answer import Answer
-    from dess.analysis.ask.limits import find_limits
-
-    if dry_run:  # an answer tells them
-        options.print_notes(question.notes)
-    answer = Answer(question, _run_question(question, page, out, workers, dry_run, yes))
-    if changes := answer.question_around():
-        _run_question(changes, page, out, workers, dry_run, yes)
-        with console.compile_notice(), console.progress_bar("mission") as shown:
-            find_limits(answer.results, question.study.scenario, workers, shown.update)
-    return answer
+    _print_answer(question, answer, render, as_json, "what-if question")
 
 
 def _run_question(
@@ -196,6 +183,7 @@ def _run_question(
     """Run a question after all checks; with --dry-run, print its plan and end the command."""
     study, folder = question.study, question.out
     if dry_run:
+        options.print_notes(question.notes)  # which an answer tells
         print_plan(question.plan(workers), study, folder, workers)
         raise typer.Exit
     check_pages(out, page)
@@ -208,30 +196,42 @@ def _run_question(
     return results
 
 
+def _ask_around(
+    question: "Question", results: "Results", page: str, out: Path, workers: int
+) -> None:
+    """Ask what one more UAV or pad brings to the cheapest fleet, and what the fleet bears."""
+    from dess.analysis.ask.around import question_around
+    from dess.analysis.ask.limits import find_limits
+
+    scenario = question.study.scenario
+    if question.study.selection and (changes := question_around(results, scenario)):
+        _run_question(changes, page, out, workers, dry_run=False, yes=True)
+        with console.compile_notice(), console.progress_bar("mission") as shown:
+            find_limits(results, scenario, workers, shown.update)
+
+
 def _print_answer(
+    question: "Question",
     answer: "Answer",
-    metric: str | None,
     render: "Callable[[Progress], Path]",
     as_json: bool,
     asked: str,
 ) -> None:
     """Print an answer, and write its page, which takes longer; or print all of it as JSON."""
-    from dess.reports.cli.tables import print_cells
+    from dess.reports.cli.tables import print_cells, print_facts
 
-    question = answer.question
-    sentences = answer.answers(metric)
-    assumed = answer.assumptions(metric)
+    facts = answer.facts()
+    assumed = answer.assumptions()
     if not as_json:
-        for table in answer.brief_tables(metric):
+        console.print_text(answer.headline())
+        print_facts(facts)
+        for table in answer.brief_tables():
             print_cells(table.cells)
             if table.caption:
                 console.print_text(table.caption)
-        for line in sentences:
-            console.print_text(line)
         if assumed:
             console.print_text("What is assumed:")
-        for line in assumed:
-            console.print_text(f"- {line}")
+            print_facts(assumed)
         console.print_text(f"study: {question.file}")
     page = None
     if absent := missing("reports", f"the page of a {asked}"):
@@ -244,9 +244,13 @@ def _print_answer(
         about = {"study": question.study.name, **places, "page": page and str(page)}
         rows = {
             name: json.loads(table.to_json(orient="records"))
-            for name, table in answer.tables(metric).items()
+            for name, table in answer.tables().items()
         }
-        told = {"answers": sentences, "assumptions": assumed}
+        told = {
+            "answers": [answer.headline(), *(fact.line for fact in facts)],
+            "assumptions": [fact.line for fact in assumed],
+            "facts": [asdict(fact) for fact in facts],
+        }
         print(json.dumps({**about, **told, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")

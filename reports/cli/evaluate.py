@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -31,6 +32,7 @@ def evaluate(
     missions: Annotated[int, typer.Option(min=1)] = 1000,
     seed: options.SeedOption = 0,
     engine: Literal["batch", "events"] | None = None,
+    process: options.ProcessOption = None,
     workers: options.WorkersOption = 1,
     out: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     yes: YesOption = False,
@@ -60,7 +62,8 @@ def evaluate(
 
     space = options.load_space(scenario, settings)
 
-    engine = engine_of([space], engine)
+    processes = tuple(options.typed_processes(process))
+    engine = engine_of([space], engine, processes)
     if out:
         study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
         study |= {
@@ -68,11 +71,10 @@ def evaluate(
             "seed": seed,
             "engine": engine,
         }
-        evaluations = _evaluate_as_study(study, out, workers, yes)
+        evaluations = _evaluate_as_study(study, processes, out, workers, yes)
     else:
-        asked = [
-            Asked(space, team, missions, seed, engine, workers, run_files=True) for team in policy
-        ]
+        about = (missions, seed, engine, workers)
+        asked = [Asked(space, team, *about, run_files=True, processes=processes) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
         with (
@@ -98,6 +100,8 @@ def evaluate(
         | {name: unknown for name in measures_of(space) if name not in evaluation.moments}
         for evaluation in evaluations
     ]
+    if processes:
+        rows = [row | {"processes": [*processes]} for row in rows]
     differences = compare_with_first(evaluations)
     for row in rows if len(differences) else ():
         of_policy = differences[differences["policy"] == row["policy"]].set_index("metric")
@@ -114,7 +118,7 @@ def evaluate(
 
 
 def _evaluate_as_study(
-    data: dict[str, Any], out: Path, workers: int, yes: bool
+    data: dict[str, Any], processes: Sequence[str], out: Path, workers: int, yes: bool
 ) -> "list[Evaluation]":
     """Run the scenario as a study, which is named after its folder."""
     from dess.analysis.execution.effort import check_run
@@ -124,7 +128,7 @@ def _evaluate_as_study(
 
     name = re.sub(r"[^A-Za-z0-9._-]+|^[._-]+", "-", out.absolute().name).lstrip("-")
     data |= {"name": name[:MOST_CHARACTERS] or "evaluation", "description": "an evaluation"}
-    study = study_from(data, "evaluate", run_files=True)
+    study = study_from(data, "evaluate", run_files=True, processes=processes)
     with console.compile_notice():
         check_run(study, out, workers, yes=yes)
     options.note_departures(study.policies, study.scenarios)
@@ -160,6 +164,8 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
         engine = ", SimPy engine" if row["engine"] == "events" else ""
+        if "processes" in row:
+            engine += f" with {', '.join(row['processes'])}"
         speed = f" in {row['seconds']:.2f} s: {row['uav_slots'] / row['seconds']:,.0f} UAV-slots/s"
         took = "" if row["seconds"] != row["seconds"] else speed
         counted = f"{row['missions']} {inflect('mission', row['missions'])}"

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
 
     from dess import ScenarioSpace
+    from dess.model.processes import TypedProcess
 
 SET = "--set"
 RESULTS = Path("results")
@@ -96,6 +97,15 @@ SetOption = Annotated[
     ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random draws.")]
+ProcessOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--process",
+        metavar="FILE.py:FUNCTION",
+        help="A process of a Python file, which takes part in every mission; repeatable. Only the "
+        "SimPy engine runs it.",
+    ),
+]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 
@@ -123,6 +133,13 @@ def read_docstring(function: Callable) -> str:
     (definition,) = ast.parse(getsource(function)).body
     assert isinstance(definition, ast.FunctionDef)
     return ast.get_docstring(definition) or ""
+
+
+def typed_processes(names: list[str] | None) -> "list[TypedProcess]":
+    """The names of ``--process``, whose files may be run."""
+    from dess.model.processes import TypedProcess
+
+    return [TypedProcess(name) for name in names or []]
 
 
 def note_departures(policies: Iterable[str], spaces: "Iterable[ScenarioSpace]") -> None:

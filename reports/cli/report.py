@@ -20,6 +20,7 @@ from dess.reports.cli.options import (
     JsonOption,
     add_command,
     parse_setting,
+    typed_processes,
 )
 from dess.reports.pages import PICTURES
 
@@ -109,6 +110,7 @@ def verify(
     missions: Annotated[int, typer.Option(min=1, max=10000)] = 20,
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     policy: Annotated[list[str] | None, typer.Option(metavar="FILE.py:CLASS")] = None,
+    process: Annotated[list[str] | None, typer.Option(metavar="FILE.py:FUNCTION")] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -120,6 +122,7 @@ def verify(
         seed: Seed of the random sample.  [default: a random number]
         policy: A policy of a Python file that the results name. It is not run without this
             option, since anybody may have made the results; repeatable.
+        process: A process of a Python file that the results name; likewise.
     """
     import secrets
 
@@ -130,8 +133,9 @@ def verify(
     check: Any = verify_page
     if path.is_dir():
         check = verify_results
+    named = [*(policy or []), *typed_processes(process)]
     with console.compile_notice():
-        verdicts = check(path, missions, seed, policy or [], yes)
+        verdicts = check(path, missions, seed, named, yes)
     if as_json:
         checks = [asdict(verdict) for verdict in verdicts]
         print(json.dumps({"seed": seed, "checks": checks}, indent=2))

@@ -63,6 +63,7 @@ def simulate(
     air_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "10 m",
     ground_distance: Annotated[str, typer.Option(metavar="LENGTH")] = "3 m",
     start: Annotated[str | None, typer.Option(metavar="TIME")] = None,
+    process: options.ProcessOption = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -90,94 +91,46 @@ def simulate(
         ground_distance: How far apart UAVs stand.
         start: Time of the start for --path and --plan, e.g. 2026-06-01T08:00Z.
     """
-    from dess import simulate
     from dess.analysis.execution.effort import check_missions
-    from dess.base.files.writing import writable
-    from dess.model.state import check_seed, sample_scenario
-    from dess.policies.registry import load_team
-    from dess.scenario.scenario import ScenarioSpace
+    from dess.model.state import check_seed
 
+    processes = options.typed_processes(process)
     if of:
         allowed = "--of without --{}"
         _refuse_given(context, ("scenario", "settings", "seed"), "comes from the study", allowed)
-        asked = _read_study(of, point, policy, replication)
+        asked = _read_study(of, point, policy, replication, processes)
     elif point is not None:
         raise InputError("--point", "belongs to a study", "with --of DIR")
     else:
-        space = options.load_space(scenario, settings)
-        policy = policy or "greedy"
-        team = load_team(policy, run_files=True)
-        asked = _Asked(space, policy, team, seed, replication or 0, scenario)
+        asked = _read_scenario(
+            scenario, settings, policy, seed, replication, options.typed_processes(process)
+        )
     if not yes:
         check_missions("simulate", [asked.space])
     check_seed(asked.seed, asked.replication)
-    if path and path.suffix.lower() in (".kml", ".gpx") and asked.space.centre is None:
-        raise InputError(f"--path: {path}", "the sea has no degrees", ".geojson, .csv")
-    begin = None
-    if start is not None:
-        begin = _parse_start(start, is_used=path is not None or plan is not None)
+    outputs = _Outputs(events, figure, animation, path, plan)
+    outputs.check_degrees(asked.space)
+    begin = _parse_start(start, outputs)
+    separation = _parse_separation(context, air_distance, ground_distance, outputs)
     positions = None
-    separation = _parse_separation(air_distance, ground_distance)
-    if plan is None and path is None:
-        options_of_plan = ("air_distance", "ground_distance")
-        allowed = "with --plan DIR or --path FILE"
-        _refuse_given(context, options_of_plan, "no output has altitudes", allowed)
     if plan is not None:
         positions = _prepare_plan(plan, asked, settings)
-        asked = replace(asked, space=ScenarioSpace.of(asked.space, forbid_swaps=True))
-    writers = {
-        events: _write_log,
-        figure: _write_map,
-        animation: _write_animation,
-        path: _write_path,
-    }
-    paths = [file for file in (events, figure, animation, path) if file]
-    if len({file.absolute() for file in paths}) < len(paths):
-        raise InputError("--events, --figure", "the same file", "a file for each")
-    console.check_ending("--events", events, LOGS, "an event log", is_stream=True)
-    console.check_ending("--figure", figure, FIGURES, "a picture")
-    console.check_ending("--animation", animation, ANIMATIONS, "an animation")
-    console.check_ending("--path", path, PATHS, "a path")
-    if animation and animation.suffix.lower() == ".mp4":
-        from dess.reports.player import check_ffmpeg
-
-        check_ffmpeg()
-    is_binary = events is not None and console.is_stdout(events)
-    if is_binary and as_json:
-        raise InputError("--json", "standard output has the event log", "--events FILE")
-    with console.open_outputs(paths) as temporaries, _open_folder(plan) as folder:
-        with console.compile_notice():
-            which = asked.seed, asked.replication
-            has_log = bool(paths) or plan is not None or not as_json
-            record = simulate(asked.space, asked.team, *which, events=has_log)
-        drawn = sample_scenario(asked.space, *which)
-        mission = _MissionToWrite(record, drawn, asked.title, separation, begin)
-        for file, temporary in zip(paths, temporaries, strict=True):
-            with writable(file):
-                writers[file](mission, temporary, file.suffix[1:].lower())
+        asked = asked.without_swaps()
+    outputs.check_files(as_json)
+    with console.open_outputs(outputs.files) as temporaries, _open_folder(plan) as folder:
+        mission = _simulate(asked, outputs.need_log or not as_json, separation, begin)
+        outputs.write(mission, temporaries)
         flight_plan = None
         if folder and positions:
             flight_plan = _write_plan(mission, positions, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
-        metrics = {key: getattr(record, key) for key in JSON_METRICS}
-        others = _metric_values(mission).items()
-        in_units = _values_in_units(record.measured, mission)
-        metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
-        measured = {}
-        if record.operations is not None:
-            measured["operations"] = in_units
-        if flight_plan:
-            measured["plan"] = flight_plan.summarise()
-        print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
-    elif not is_binary:
+        print(json.dumps(_make_document(asked, mission, flight_plan), indent=2))
+        return
+    if not outputs.fill_stdout:
         _print_mission(mission)
-    if flight_plan and not as_json:
-        stream = sys.stdout
-        if is_binary:
-            stream = sys.stderr
-        for line in flight_plan.list_sentences():
-            console.print_text(line, stream)
+    if flight_plan:
+        _print_plan(flight_plan, outputs)
 
 
 @dataclass(frozen=True)
@@ -189,9 +142,16 @@ class _Asked:
     team: "list[Policy]"
     seed: int
     replication: int
+    processes: Sequence[str]
     scenario: str
     study: str = ""
     point: int | None = None
+
+    def without_swaps(self) -> "_Asked":
+        """The same in a sea in which UAVs do not swap their cells."""
+        from dess.scenario.scenario import ScenarioSpace
+
+        return replace(self, space=ScenarioSpace.of(self.space, forbid_swaps=True))
 
     @property
     def title(self) -> str:
@@ -205,11 +165,95 @@ class _Asked:
         shown = ["policy", "scenario", "seed", "replication"]
         if self.point is not None:
             shown += ["study", "point"]
+        if self.processes:
+            shown.append("processes")
         return {name: getattr(self, name) for name in shown}
 
 
+@dataclass(frozen=True)
+class _Outputs:
+    """What a mission is written into."""
+
+    events: Path | None
+    figure: Path | None
+    animation: Path | None
+    path: Path | None
+    plan: Path | None
+
+    @property
+    def files(self) -> list[Path]:
+        """The files."""
+        chosen = (self.events, self.figure, self.animation, self.path)
+        return [file for file in chosen if file]
+
+    @property
+    def need_log(self) -> bool:
+        """Whether an output is made from the event log."""
+        return bool(self.files) or self.plan is not None
+
+    @property
+    def fill_stdout(self) -> bool:
+        """Whether standard output has the event log."""
+        return self.events is not None and console.is_stdout(self.events)
+
+    def check_degrees(self, space: "ScenarioSpace") -> None:
+        """Refuse a path in degrees of a sea that has none."""
+        if self.path and self.path.suffix.lower() in (".kml", ".gpx") and space.centre is None:
+            raise InputError(f"--path: {self.path}", "the sea has no degrees", ".geojson, .csv")
+
+    def check_files(self, as_json: bool) -> None:
+        """Refuse files that exclude each other, have a wrong ending, or cannot be made here."""
+        if len({file.absolute() for file in self.files}) < len(self.files):
+            raise InputError("--events, --figure", "the same file", "a file for each")
+        console.check_ending("--events", self.events, LOGS, "an event log", is_stream=True)
+        console.check_ending("--figure", self.figure, FIGURES, "a picture")
+        console.check_ending("--animation", self.animation, ANIMATIONS, "an animation")
+        console.check_ending("--path", self.path, PATHS, "a path")
+        if self.animation and self.animation.suffix.lower() == ".mp4":
+            from dess.reports.player import check_ffmpeg
+
+            check_ffmpeg()
+        if self.fill_stdout and as_json:
+            raise InputError("--json", "standard output has the event log", "--events FILE")
+
+    def write(self, mission: "_MissionToWrite", temporaries: Sequence[Path]) -> None:
+        """Write the mission into temporary files, which become ``files``."""
+        from dess.base.files.writing import writable
+
+        writers = {
+            self.events: _write_log,
+            self.figure: _write_map,
+            self.animation: _write_animation,
+            self.path: _write_path,
+        }
+        for file, temporary in zip(self.files, temporaries, strict=True):
+            with writable(file):
+                writers[file](mission, temporary, file.suffix[1:].lower())
+
+
+def _read_scenario(
+    scenario: str,
+    settings: list[str] | None,
+    policy: str | None,
+    seed: int,
+    replication: int | None,
+    processes: Sequence[str],
+) -> _Asked:
+    """A mission of a scenario."""
+    from dess.policies.registry import load_team
+
+    space = options.load_space(scenario, settings)
+    policy = policy or "greedy"
+    team = load_team(policy, run_files=True)
+    return _Asked(space, policy, team, seed, replication or 0, processes, scenario)
+
+
 def _read_study(
-    folder: Path, point: int | None, policy: str | None, replication: int | None
+    folder: Path,
+    point: int | None,
+    policy: str | None,
+    replication: int | None,
+    processes: Sequence[str],
 ) -> _Asked:
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
     from dess.analysis.results.chunks import MANIFEST
@@ -224,13 +268,34 @@ def _read_study(
     point = _choose_of_study("point", point, points, f"0..{len(points) - 1}")
     space = manifest.scenarios[point]
     team = load_team(policy, space.uavs[1], run_files=bool(named))
-    if changes := manifest.changes_here(named):
+    manifest.load_processes(processes)
+    of_study = [identity.process for identity in manifest.processes]
+    if others := [process for process in processes if process not in of_study]:
+        problem = f"{shown(others[0])} is not in the study"
+        raise InputError("--process", problem, ", ".join(of_study) or "none")
+    if changes := manifest.changes_here([*named, *processes]):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
         console.print_text(line, sys.stderr)
     if replication is None:
         replication = manifest.points[point].replication
     names = manifest.study.scenario, manifest.study.name
-    return _Asked(space, policy, team, manifest.seed, replication, *names, point)
+    return _Asked(space, policy, team, manifest.seed, replication, processes, *names, point)
+
+
+def _simulate(
+    asked: _Asked, has_log: bool, separation: "Separation", start: datetime | None
+) -> "_MissionToWrite":
+    """Simulate the mission."""
+    from dess import simulate
+    from dess.model.processes import load_processes
+    from dess.model.state import sample_scenario
+
+    which = asked.seed, asked.replication
+    processes = load_processes(asked.processes)
+    with console.compile_notice():
+        record = simulate(asked.space, asked.team, *which, events=has_log, processes=processes)
+    drawn = sample_scenario(asked.space, *which)
+    return _MissionToWrite(record, drawn, asked.title, separation, start)
 
 
 def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:
@@ -336,13 +401,15 @@ def _write_path(mission: _MissionToWrite, path: Path, kind: str) -> None:
     fill(path, text.encode())
 
 
-def _parse_start(text: str, *, is_used: bool) -> datetime:
-    """A time of day with its date, in UTC unless it says otherwise.
+def _parse_start(text: str | None, outputs: _Outputs) -> datetime | None:
+    """A time of day with its date, in UTC unless it says otherwise; None if there is no text.
 
     Raises:
         InputError: If it is none, or if no output has times of day.
     """
-    if not is_used:
+    if text is None:
+        return None
+    if outputs.path is None and outputs.plan is None:
         raise InputError("--start", "no output has times", "with --path FILE or --plan DIR")
     allowed = "a date and a time from 1970 to 2100, e.g. 2026-06-01T08:00Z"
     try:
@@ -384,11 +451,14 @@ def _open_folder(plan: Path | None) -> AbstractContextManager[Path | None]:
     return creating_folder(plan)
 
 
-def _parse_separation(air: str, ground: str) -> "Separation":
+def _parse_separation(
+    context: typer.Context, air: str, ground: str, outputs: _Outputs
+) -> "Separation":
     """How far apart UAVs have to be.
 
     Raises:
-        InputError: If one of them is no length, or out of range.
+        InputError: If one of them is no length, or out of range; or if it is given, and no output
+            has altitudes.
     """
     from dess.analysis.flights.separation import Separation
     from dess.scenario.quantities import quantity_of
@@ -399,6 +469,10 @@ def _parse_separation(air: str, ground: str) -> "Separation":
         if not 1 <= length <= MOST_DISTANCE:
             raise InputError(option, f"{shown(text)} is out of range", f"1 m..{MOST_DISTANCE} m")
         metres.append(length)
+    if outputs.plan is None and outputs.path is None:
+        options_of_plan = ("air_distance", "ground_distance")
+        allowed = "with --plan DIR or --path FILE"
+        _refuse_given(context, options_of_plan, "no output has altitudes", allowed)
     return Separation(*metres)
 
 
@@ -427,6 +501,31 @@ def _write_page(mission: _MissionToWrite, path: Path) -> None:
     title, outcome = mission.title, mission.outcome
     page = fill_page("mission.html", scripts=True, title=title, outcome=outcome, **parts)
     writing.fill(path, page)
+
+
+def _make_document(
+    asked: _Asked, mission: _MissionToWrite, flight_plan: "FlightPlan | None"
+) -> dict[str, Any]:
+    """The mission as plain data."""
+    record = mission.record
+    metrics = {key: getattr(record, key) for key in JSON_METRICS}
+    others = _metric_values(mission).items()
+    metrics |= {k: value for k, value in others if k not in (*asked.names, *metrics, "uavs")}
+    document = asked.names | metrics | {"uavs": record.uav_rows()}
+    if record.operations is not None:
+        document["operations"] = _values_in_units(record.measured, mission)
+    if flight_plan:
+        document["plan"] = flight_plan.summarise()
+    return document
+
+
+def _print_plan(flight_plan: "FlightPlan", outputs: _Outputs) -> None:
+    """Print what there is to say of a plan, on stderr if standard output has the event log."""
+    stream = sys.stdout
+    if outputs.fill_stdout:
+        stream = sys.stderr
+    for line in flight_plan.list_sentences():
+        console.print_text(line, stream)
 
 
 def _metric_values(mission: _MissionToWrite) -> dict[str, float]:

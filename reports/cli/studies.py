@@ -52,6 +52,7 @@ def run(
     policy: Annotated[
         list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
+    process: options.ProcessOption = None,
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
     accept_code: Annotated[bool, typer.Option("--accept-code")] = False,
     page: Annotated[
@@ -75,7 +76,8 @@ def run(
 
     changes = {"missions": missions, "policies": policy}
     chosen = {key: value for key, value in changes.items() if value is not None}
-    studies = [load_study(name, **chosen) for name in names]
+    processes = options.typed_processes(process)
+    studies = [load_study(name, processes=processes, **chosen) for name in names]
     if out and len(studies) == 1:
         folders = [out]
     else:

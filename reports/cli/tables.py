@@ -1,17 +1,21 @@
 """Tables of the results of a study in the terminal."""
 
+import textwrap
 from collections.abc import Iterable, Mapping
+from dataclasses import astuple
+from itertools import zip_longest
 from pathlib import Path
 
 import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import diff, optimality, summary
-from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import setting_cells
 from dess.analysis.answers.settings.points import points_in_words, setting_in_words
 from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.answers.settings.sobol import index_table
+from dess.analysis.ask.answer import settings_answer
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import (
     METRICS,
     PRODUCT,
@@ -31,6 +35,8 @@ from dess.reports.cli import console
 
 _SHORT = {name: metric_of(metric).head for metric, name in METRICS.items()}
 _QUANTILES = (0.05, 0.5, 0.95)
+_FACT_HEADS = ("", "Found", "Required", "Guaranteed")
+_LABEL_WIDTH = 28  # of the facts of an answer [characters]
 MANY_POINTS = 40  # more design points are not listed
 
 
@@ -39,6 +45,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     study = results.study
     missions = numbers.format_count(len(results.missions), "mission")
     console.print_text(f"{folder}: {missions} of study {study.name}")
+    if results.store.manifest.processes:
+        console.print_text(f" with {results.store.manifest.functions}, in the SimPy engine")
     for change in results.store.manifest.accepted:
         console.print_text(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})
@@ -47,8 +55,9 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         _print_selections(selected)
         is_search = "condition" in selected
         if is_search and study.costs:
-            for text in search_of(results).sentences():
-                console.print_text(f" {text.translate(str.maketrans('', '', '*`'))}")
+            answer = settings_answer(results)
+            console.print_text(f" {answer.headline()}")
+            print_facts(answer.facts())
         if len(results.checks):
             means = summary.means_of_check(results)
             checks = study.selection.check
@@ -133,6 +142,25 @@ def print_cells(cells: pd.DataFrame) -> None:
     """Print a table of text."""
     first = cells.columns[0]
     print_frame(str(first), cells.set_index(first))
+
+
+def print_facts(facts: Iterable[Fact]) -> None:
+    """Print the facts of an answer as a table; long ones take several lines."""
+    lines = [astuple(fact) for fact in facts]
+    columns = [
+        [head, *column]
+        for head, column in zip(_FACT_HEADS, zip(*lines, strict=True), strict=True)
+        if any(column)
+    ]
+    widths = [max(map(len, column)) for column in columns]
+    widths[0] = min(widths[0], _LABEL_WIDTH)
+    widths[1] = console.WIDTH - sum(width + 2 for width in widths[2:]) - widths[0] - 2
+    heads, *rows = zip(*columns, strict=True)
+    wrapped: list[tuple[str, ...]] = []
+    for row in rows:
+        cells = [textwrap.wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
+        wrapped += zip_longest(*cells, fillvalue="")
+    console.print_table(heads, wrapped, left=len(heads))
 
 
 def print_table_with_caption(table: Table) -> None:

@@ -28,6 +28,7 @@ from dess.analysis.answers import missions, summary
 from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import LoggedMission
+from dess.base.commands import command_line
 from dess.reports.pages.markdown import command_block, write_markdown
 from dess.reports.pages.panel import make_another
 from dess.reports.pages.parts import Part, make_answer, make_gallery
@@ -157,11 +158,12 @@ make_table(missions.outcome_table(shown), "The missions; data in data units")
 # These commands simulate the missions again:
 
 # %%
-command = (
-    f"dess simulate --scenario {fig4.manifest['study']['scenario']} --set uavs={{}} "
-    f"--policy {shown_policy} --seed {seed} --replication {replication}"
-)
-write_markdown("{commands}", commands=command_block(command.format(m.scenario.uavs) for m in shown))
+which = {"policy": shown_policy, "seed": seed, "replication": replication}
+commands = [
+    command_line("simulate", scenario=fig4.study.scenario, set={"uavs": m.scenario.uavs}, **which)
+    for m in shown
+]
+write_markdown("{commands}", commands=command_block(commands))
 
 # %%
 provenance_table([fig1, fig4])

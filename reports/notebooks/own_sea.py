@@ -38,8 +38,6 @@ from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
 from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
 from dess.analysis.ask import around
-from dess.analysis.ask.assumptions import assumption_sentences, limit_sentences
-from dess.analysis.ask.brief import brief_sentences
 from dess.analysis.ask.falls import draw_falls
 from dess.analysis.ask.limits import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
@@ -47,7 +45,14 @@ from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
 from dess.reports.pages import study
 from dess.reports.pages.markdown import command_block, write_markdown
-from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.parts import (
+    lead_figure,
+    make_answer,
+    make_assumptions,
+    make_facts,
+    make_gallery,
+    show_parts,
+)
 from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.templates import render_part
 
@@ -65,17 +70,17 @@ if asked := around.question_around(found, scenario):
     asked.ask(workers, yes=yes)
     find_limits(found, scenario, workers)
 search = search_of(found)
-make_answer(search.sentence(), search.best.fleet)
+make_answer(answer.headline(), search.best.fleet)
 
 # %%
 lead_figure(*draw_cheapest(found))
 
 # %%
+make_facts(answer.facts())
+
+# %%
 if sea.units:
-    show_parts(
-        study.draw_typical_mission(found),
-        render_part("brief.html", lines=brief_sentences(found)),
-    )
+    show_parts(study.draw_typical_mission(found))
 
 # %%
 point = search.shown_point
@@ -83,17 +88,13 @@ shown = found.scenario(point)
 study.make_panel_of(found)
 
 # %%
-assumed = [*assumption_sentences(found), *limit_sentences(found)] if sea.units else []
-render_part("assumptions.html", lines=assumed) if assumed else None
+make_assumptions(answer.assumptions()) if sea.units else None
 
 # %% [markdown]
 # ## Why
 
 # %%
-show_parts(
-    fleet_tables.fleet_table(found),
-    write_markdown("{reasons}", reasons=study.list_reasons(found)),
-)
+show_parts(fleet_tables.fleet_table(found))
 
 # %%
 mission = resimulate(found, search.best.policy, point, 0)
@@ -120,7 +121,10 @@ if around.is_known(found):
 
 # %%
 no_check = write_markdown("No fleet was checked.")
-show_parts(no_check if found.checks.empty else fleet_tables.check_table(found))
+show_parts(
+    no_check if found.checks.empty else fleet_tables.check_table(found),
+    write_markdown("{guarantees}", guarantees=study.list_guarantees(found)),
+)
 
 # %% [markdown]
 # ## Tables
@@ -154,7 +158,7 @@ show_parts(
 # This command runs the same sweep and makes a page with more details:
 
 # %%
-write_markdown("{lines}", lines=command_block([answer.question.command]))
+write_markdown("{lines}", lines=command_block([answer.command]))
 
 # %%
 render_part("left_out.html") if sea.units else None

@@ -28,7 +28,7 @@ from dess.analysis import distribution, load_results, tables
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table, prices_in_words
+from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
 from dess.analysis.answers.main_figure import draw_main_figure
 from dess.analysis.answers.settings.baseline import baseline_in_words, baseline_table
@@ -47,7 +47,6 @@ from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     allowance_for_setting,
     best_of_policies_table,
-    best_settings_sentence,
     best_settings_table,
     missions_at_best,
     rank_settings,
@@ -59,10 +58,19 @@ from dess.analysis.answers.settings.sobol import (
     variance_sentence,
 )
 from dess.analysis.answers.summary import draw_performance
+from dess.analysis.ask.answer import settings_answer
+from dess.analysis.ask.assumptions import assumption_facts
 from dess.analysis.metrics import METRICS, SUCCESS, metric_of
 from dess.reports.pages import study as page
 from dess.reports.pages.markdown import write_markdown
-from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.parts import (
+    lead_figure,
+    make_answer,
+    make_assumptions,
+    make_facts,
+    make_gallery,
+    show_parts,
+)
 from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.templates import render_part
 
@@ -74,14 +82,14 @@ called = metric_of(by).within
 
 # %% tags=["if-cheapest"]
 search = search_of(study)
-make_answer(search.sentence())
 
 # %% tags=["if-answer"]
 ranked = rank_settings(study, by)
 best = ranked.iloc[0]
 
-# %% tags=["if-answer"]
-make_answer(best_settings_sentence(study, ranked, by))
+# %% tags=["if-ranked"]
+answer = settings_answer(study, metric=by)
+make_answer(answer.headline())
 
 # %% tags=["if-sensitivity"]
 make_answer(variance_sentence(study, by))
@@ -89,21 +97,17 @@ make_answer(variance_sentence(study, by))
 # %%
 lead_figure(*draw_main_figure(study, by))
 
-# %% tags=["if-brief"]
-from dess.analysis.ask.brief import brief_sentences
+# %% tags=["if-ranked"]
+make_facts(answer.facts())
 
-show_parts(
-    page.draw_typical_mission(study),
-    render_part("brief.html", lines=brief_sentences(study)),
-)
+# %% tags=["if-brief"]
+show_parts(page.draw_typical_mission(study))
 
 # %%
 page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
-from dess.analysis.ask.assumptions import assumption_sentences, limit_sentences
-
-render_part("assumptions.html", lines=[*assumption_sentences(study, by), *limit_sentences(study)])
+make_assumptions(assumption_facts(study, by))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why
@@ -112,10 +116,7 @@ render_part("assumptions.html", lines=[*assumption_sentences(study, by), *limit_
 # fleet gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-cheapest"]
-show_parts(
-    fleet_tables.fleet_table(study, by if metric else SUCCESS),
-    write_markdown("{answers}", answers=page.list_reasons(study)),
-)
+show_parts(fleet_tables.fleet_table(study, by if metric else SUCCESS))
 
 # %% tags=["if-conditions"]
 show_parts(fleet_tables.condition_table(study))
@@ -138,7 +139,10 @@ show_parts(around.table_around(study), draw_falls(study))
 
 # %% tags=["if-cheapest"]
 no_check = write_markdown("No setting was checked.")
-show_parts(no_check if study.checks.empty else fleet_tables.check_table(study))
+show_parts(
+    no_check if study.checks.empty else fleet_tables.check_table(study),
+    write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
+)
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
@@ -178,7 +182,6 @@ show_parts(cost_parts_table(study))
 
 # %% tags=["if-costs"]
 show_parts(
-    write_markdown("{prices}", prices=prices_in_words(study)),
     draw_cost_fronts(study),
     cost_front_table(study),
     cost_parts_table(study),

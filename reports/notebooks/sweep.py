@@ -29,13 +29,12 @@ from dess.analysis import sweep
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     best_of_policies_table,
-    best_settings_sentence,
     best_settings_table,
 )
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.reports.pages import study
 from dess.reports.pages.markdown import command_block, write_markdown
-from dess.reports.pages.parts import lead_figure, make_answer, make_gallery, show_parts
+from dess.reports.pages.parts import lead_figure, make_answer, make_facts, make_gallery, show_parts
 from dess.reports.pages.provenance import provenance_table
 
 # %%
@@ -50,10 +49,13 @@ drawn = {
 }
 
 # %%
-make_answer(best_settings_sentence(answer.results, ranked, PRODUCT))
+make_answer(answer.headline())
 
 # %%
 lead_figure(*drawn[PRODUCT])
+
+# %%
+make_facts(answer.facts())
 
 # %%
 study.make_panel_of(answer.results, PRODUCT)
@@ -88,7 +90,7 @@ show_parts(best_of_policies_table(answer.results, PRODUCT))
 # cheapest fleet ([own sea](own-sea.html)).
 
 # %%
-write_markdown("{lines}", lines=command_block([answer.question.command]))
+write_markdown("{lines}", lines=command_block([answer.command]))
 
 # %% [markdown]
 # ## How this page was made

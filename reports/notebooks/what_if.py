@@ -36,7 +36,7 @@ from dess.analysis.metrics import metric_of
 from dess.reports.pages import study as page
 from dess.reports.pages.markdown import code_block, command_block, escape_sentences, write_markdown
 from dess.reports.pages.panel import make_panel
-from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
+from dess.reports.pages.parts import lead_figure, make_answer, make_facts, make_gallery
 from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.tables import make_table
 
@@ -48,12 +48,14 @@ found = asked.results
 variation = asked.variation
 
 # %%
-make_answer(variation.sentence())
+make_answer(asked.headline())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-about = f"{variation.finding()} {pairs}; {tables.BARS}"
-lead_figure(variation.plot(), "Paired differences of the metrics", about)
+lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
+
+# %%
+make_facts(asked.facts())
 
 # %%
 sides = found.scenario(0), found.scenario(1)
@@ -63,17 +65,11 @@ make_panel(*sides, scenario, found.policies, seed, given=found.given_values(0))
 # ## Why
 
 # %%
-write_markdown("Of the pairs, {better}.", better=escape_sentences(variation.winners()))
-
-# %%
-write_markdown("{contrasts}", contrasts=escape_sentences(variation.contrasts()))
-
-# %%
 extended = [metric for metric in measured_columns(found) if found.missions[metric].any()]
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
-spread = f"In {pairs}, {variation.winners()}. The lower panel ends at the 5 % and 95 % quantiles."
+spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
 make_gallery(
     [
         (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
@@ -81,7 +77,7 @@ make_gallery(
             (
                 variation.plot_means(metric),
                 f"{metric_of(metric).name}, baseline and variation",
-                f"{variation.finding_of(metric)} {caption}",
+                f"{metric_of(metric).name}. {caption}",
             )
             for metric in (*metrics.METRICS, *extended)
         ),
@@ -100,12 +96,14 @@ make_gallery([drawing for example in examples for drawing in example.drawings()]
 
 # %% [markdown]
 # ## How far to trust it
+#
+# A difference is inconclusive if its interval contains 0; intervals of the means may overlap
+# although the paired difference is clear. A learned policy is used as it was trained: in a setting
+# far from its training, a new training may do better.
 
 # %%
 write_markdown(
-    "{answer}\n\n{reading}\n\n{why} {weights}\n\n{notes}",
-    answer=escape_sentences(variation.answer()),
-    reading=escape_sentences(variation.reading()),
+    "{why} {weights}\n\n{notes}",
     why=summary.allowance_for_difference(variation.table(), "policy"),
     weights=summary.weights_in_words(found),
     notes=page.list_notes(found),
@@ -136,7 +134,7 @@ for policy in found.policies:
 # lines are the same question as a study: every further row is another variation.
 
 # %%
-command = command_block([asked.question.command])
+command = command_block([asked.command])
 study = code_block("toml", variation.as_toml().rstrip("\n"))
 write_markdown("{command}\n\n{study}", command=command, study=study)
 

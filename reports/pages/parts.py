@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from IPython.display import HTML, Markdown, display
+from markupsafe import Markup
 
+from dess.analysis.facts import Fact
 from dess.analysis.tables import Table
 from dess.base.errors import printable
 from dess.reports.pages import ASKED
 from dess.reports.pages.downloads import make_download_links
 from dess.reports.pages.figures import encode_figure, figure_address, resize_figure
 from dess.reports.pages.tables import make_table
-from dess.reports.pages.templates import load_template
+from dess.reports.pages.templates import load_template, render_part
 
 if TYPE_CHECKING:  # an index is made without figures
     from matplotlib.figure import Figure
@@ -55,6 +57,20 @@ def make_answer(sentence: str, number: str = "") -> Part:
         number: The number of the answer, for pages that have a tile on the index.
     """
     return Part(sentence=printable(re.sub(r"[*`]", "", sentence)), number=number)
+
+
+def make_facts(facts: Iterable[Fact]) -> HTML:
+    """The facts of an answer as a table, with links that save it."""
+    shown = [*facts]
+    frame = pd.DataFrame(shown)
+    links = Markup(make_download_links("The answer in facts", frame, frame))
+    is_required = any(fact.required for fact in shown)
+    return render_part("facts.html", facts=shown, is_required=is_required, links=links)
+
+
+def make_assumptions(facts: Iterable[Fact]) -> HTML:
+    """What an answer assumes, in a frame of its own."""
+    return render_part("assumptions.html", facts=facts)
 
 
 def make_figure(

@@ -50,6 +50,7 @@ def _origin_table(evidence: Sequence[Evidence]) -> HTML:
             "Study key": e.key,
             "dess": e.version,
             "Code": e.engine_code[:SHORT],
+            "Processes": ", ".join(f"{p.process} {p.code[:SHORT]}" for p in e.processes),
             "Accepted": "; ".join(change.text for change in e.accepted),
             "Commit": (e.commit or "unknown")[:SHORT],
             "Libraries": ", ".join(f"{name} {version}" for name, version in e.libraries.items()),
@@ -59,6 +60,8 @@ def _origin_table(evidence: Sequence[Evidence]) -> HTML:
     frame = pd.DataFrame(columns).rename_axis("Study")
     if not any(e.accepted for e in evidence):
         frame = frame.drop("Accepted")
+    if not any(e.processes for e in evidence):
+        frame = frame.drop("Processes")
     return make_table(frame.reset_index(), wrap=True)
 
 

@@ -5,7 +5,6 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from shlex import quote
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +12,7 @@ from dess import InputError
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.tables import Results
+from dess.base.commands import command_line
 from dess.base.files.reading import Missing
 from dess.base.files.writing import delete, locked, write_files
 from dess.reports.pages import INDEX, LOCK, check_pages, kernels, notebook
@@ -85,11 +85,11 @@ def render(
     lacking = {r.name: {} if r.is_current else _list_lacking(r, results) for r in reports}
     commands = {c: error for errors in lacking.values() for c, error in errors.items()}
     if asked and len(commands) > 1 and all(isinstance(e, Missing) for e in commands.values()):
-        names = " ".join(command.rpartition(" ")[2] for command in commands)
+        studies = [command.rpartition(" ")[2] for command in commands]
         raise InputError(
             "results",
             f"{results} holds no results of {len(commands)} studies",
-            f"what is made by: dess study run {names} --out {quote(str(results))}",
+            f"what is made by: {command_line('study', 'run', *studies, out=results)}",
         )
     for name, errors in lacking.items():
         for error in errors.values():
@@ -190,7 +190,7 @@ def _list_lacking(report: notebook.Report, results: Path) -> dict[str, InputErro
         try:
             _check_results(results / study)
         except InputError as error:
-            errors[f"dess study run {study}"] = error
+            errors[command_line("study", "run", study)] = error
     return errors
 
 
@@ -199,7 +199,7 @@ def _check_results(folder: Path) -> None:
         raise Missing(
             "results",
             f"{folder} holds no results of study {folder.name}",
-            f"what is made by: dess study run {folder.name} --out {quote(str(folder))}",
+            f"what is made by: {command_line('study', 'run', folder.name, out=folder)}",
         )
     manifest = Manifest.read(folder / MANIFEST)
     study = manifest.study.name

@@ -12,7 +12,6 @@ from IPython.display import HTML, Markdown
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import prices_in_words
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.missions import map_caption, neglected_sentence, typical_replication
 from dess.analysis.answers.settings.baseline import check_baseline
@@ -37,7 +36,6 @@ from dess.reports.pages import PREFIX, notebook
 from dess.reports.pages.markdown import (
     Marked,
     command_block,
-    escape_sentences,
     escape_text,
     fill_markdown,
     format_code,
@@ -151,7 +149,7 @@ def list_guarantees(results: Results) -> Marked:
     lines = [
         fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows
     ]
-    return Marked("\n".join(lines))
+    return Marked("\n".join(dict.fromkeys(lines)))
 
 
 def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
@@ -167,14 +165,6 @@ def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
         folder=format_code(results.usual_folder),
         lines=command_block(missions["command"]),
     )
-
-
-def list_reasons(results: Results) -> Marked:
-    """The prices, how sure the answer of a search is, the other answers, and the guarantee."""
-    search = search_of(results)
-    lines = [f"- {text}" for text in (prices_in_words(results), *search.reason_sentences())]
-    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(search.guarantee_sentences()))
-    return escape_sentences("\n".join(lines) + f"\n\n{sure}")
 
 
 def _describe_design(results: Results) -> Iterator[Marked]:
@@ -246,6 +236,9 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         results: The study.
         metric: The metric that ranks the settings, if it is not that of the study.
     """
+    manifest = results.store.manifest
+    if manifest.processes:
+        return Markdown(f"A page cannot simulate {manifest.functions}, which is Python.")
     point, policy = 0, results.policies[0]
     shown_search = None
     rule = results.study.selection
@@ -264,7 +257,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     elif results.design != "saltelli":
         best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
         point, policy = int(best.point), best.policy
-    space, manifest = results.scenario(point), results.store.manifest
+    space = results.scenario(point)
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     return make_panel(
         space,
@@ -283,15 +276,15 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
 def draw_typical_mission(results: Results) -> list[Drawing]:
     """The map of a typical mission of the cheapest fleet, with the names of its nodes.
 
-    It is the mission with the median of what decides the search. None is drawn if the policy is a
-    Python file, which may be anybody's code.
+    It is the mission with the median of what decides the search. None is drawn if the policy or a
+    process is a Python file, which may be anybody's code.
 
     Args:
         results: A study that searches for the cheapest fleet.
     """
     search = search_of(results)
     policy = search.best.policy
-    if is_path(policy):
+    if is_path(policy) or results.store.manifest.processes:
         return []
     column = search.deciding_requirement()[0].column
     replication = typical_replication(search.shown_missions, column)

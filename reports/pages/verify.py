@@ -69,7 +69,7 @@ class _Sampling:
     Attributes:
         missions: The largest number of missions of every study.
         seed: Seed of the random choice.
-        named: Policies of Python files that the user has named.
+        named: Policies and processes of Python files that the user has named.
         yes: Whether any time and memory is allowed.
         seconds: The longest time that the missions so far can take [s].
     """
@@ -105,7 +105,7 @@ def verify_page(
         path: The page.
         missions: The largest number of missions to simulate again, for every study on the page.
         seed: Seed of the random choice of these missions.
-        named: Policies of Python files that the user has named, so that they may be run.
+        named: Policies and processes of Python files that the user has named, which may be run.
         yes: Whether missions may take any time.
 
     Raises:
@@ -144,7 +144,7 @@ def verify_results(
         folder: A results folder, or a folder with results folders.
         missions: The largest number of missions to simulate again, for every study.
         seed: Seed of the random choice of these missions.
-        named: Policies of Python files that the user has named, so that they may be run.
+        named: Policies and processes of Python files that the user has named, which may be run.
         yes: Whether missions may take any time.
 
     Raises:
@@ -199,8 +199,10 @@ def _draw_missions(evidence: Evidence, sampling: _Sampling) -> _Drawn:
 def _compare_missions(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) -> Check:
     """Simulate missions again, and compare their records."""
     lines = []
+    processes = evidence.load_processes(named)
     for mission, space, team in drawn:
-        record = simulate(space, team, evidence.seed, mission.replication)
+        about = (space, team, evidence.seed, mission.replication)
+        record = simulate(*about, processes=processes)
         if changed := difference_in_words(record, mission.record):
             coordinates = (mission.policy, mission.values, mission.replication)
             command = tables.of_fields(evidence, *coordinates)
@@ -219,7 +221,9 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         space = manifest.scenarios[cell.point]
         policy = manifest.policies[cell.team].policy
         team = load_team(policy, space.uavs[1], run_files=is_confirmed(policy, sampling.named))
-        log = simulate(space, team, manifest.seed, replication, events=True).events
+        processes = manifest.load_processes(sampling.named)
+        about = (space, team, manifest.seed, replication)
+        log = simulate(*about, events=True, processes=processes).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(

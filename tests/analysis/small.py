@@ -2,14 +2,16 @@
 
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from dess.analysis import load_study
-from dess.analysis.ask.answer import Answer
+from dess.analysis.ask.answer import VariationAnswer
 from dess.analysis.ask.question import what_if_question
+from dess.analysis.facts import Fact
 from dess.analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
@@ -61,7 +63,7 @@ def small_study(folder: Path, **changes: Any) -> Study:
     return load_study(path, **changes)
 
 
-def asked(folder: Path, missions: int = 12, **changes: Any) -> Answer:
+def asked(folder: Path, missions: int = 12, **changes: Any) -> VariationAnswer:
     """The answer to a question about the small scenario: six UAVs at a single pad, not two."""
     values = {
         "settings": {"uavs": 6, "pads": 1},
@@ -72,7 +74,12 @@ def asked(folder: Path, missions: int = 12, **changes: Any) -> Answer:
         "missions": missions,
     }
     question = what_if_question(**values | changes, folder=folder)
-    return Answer(question, question.ask())
+    return VariationAnswer(question.ask(), question)
+
+
+def found_of(facts: Iterable[Fact]) -> dict[str, str]:
+    """What facts say was found, by their labels."""
+    return {fact.label: fact.found for fact in facts}
 
 
 def grid(**values: Any) -> dict[str, Any]:

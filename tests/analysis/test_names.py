@@ -3,7 +3,7 @@
 import pytest
 
 from dess import load_scenario
-from dess.analysis.ask.answer import Answer
+from dess.analysis.ask.answer import VariationAnswer
 from dess.analysis.ask.question import what_if_question
 from dess.analysis.names import field_in_words, field_named
 from dess.scenario.fields import fields_of
@@ -34,6 +34,6 @@ def test_pads_of_zones_are_told_as_they_were_asked(tmp_path):
     scenario = write_scenario(tmp_path, zones=ZONES)
     settings = {"zones.pads": [0, 1], "uavs": 2}
     question = what_if_question(settings, None, scenario, ["random"], 2, folder=tmp_path)
-    sentence = Answer(question, question.ask()).answers()[0]
+    sentence = VariationAnswer(question.ask(), question).headline()
     pads = "pads of each further zone 0 + 1 instead of 1 + 1"
     assert pads in sentence and ",," not in sentence

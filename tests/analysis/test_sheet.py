@@ -43,9 +43,10 @@ def test_an_answer_tells_it_too(tmp_path):
     found = analysis.sweep(
         tmp_path / "sea.toml", ["greedy"], 2, folder=tmp_path, progress=False, uavs=[1, 2]
     )
-    assert found.answers()[-2:] == [
-        "Beyond the margins that the return guard keeps for 2 UAVs: between.",
-        "Without these nodes a collection ratio of 33.3 % is the highest.",
+    assert [fact.found for fact in found.facts() if fact.label == "note"] == [
+        "out of reach of a UAV from a full battery: far",
+        "beyond the margins that the return guard keeps for 2 UAVs: between",
+        "without these nodes a collection ratio of 33.3 % is the highest",
     ]
 
 
@@ -60,7 +61,7 @@ def test_a_command_tells_it_once(more, tmp_path, capsys, monkeypatch):
     command = ["sweep", "--scenario", str(tmp_path / "sea.toml"), "--set", "uavs=1,2"]
     command += ["--policy", "greedy", "--missions", "2", "--results", str(tmp_path / "results")]
     assert main([*command, *more]) == 0
-    told = "".join(capsys.readouterr())
+    told = " ".join("".join(capsys.readouterr()).split())
     assert told.count("a collection ratio of 33.3 % is the highest") == 1
 
 

@@ -15,13 +15,12 @@ from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import mean_cost_parts
 from dess.analysis.answers.fleet.requirements import metric_asked_for
-from dess.analysis.answers.fleet.risk import risk_sentence
+from dess.analysis.answers.fleet.risk import risk_facts
 from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, charging_slots, rule_of_thumb
-from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
+from dess.analysis.answers.settings.ranking import unequal_lengths
 from dess.analysis.ask import around, limits
-from dess.analysis.ask.answer import Answer
-from dess.analysis.ask.assumptions import assumption_sentences
-from dess.analysis.ask.brief import brief_sentences
+from dess.analysis.ask.answer import FleetAnswer, VariationAnswer
+from dess.analysis.ask.assumptions import assumption_facts
 from dess.analysis.ask.limits import Bisection
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
@@ -31,7 +30,7 @@ from dess.analysis.study.study import CHECK
 from dess.model.state import EAST, SOUTH
 from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
-from tests.analysis.small import SCENARIO, SHEET, write_scenario
+from tests.analysis.small import SCENARIO, SHEET, found_of, write_scenario
 
 PRICES = {"uav": 20_000, "pad": 5_000, "hour": 36}
 SLOT, UNIT = 21.0, 21.0 * 125e3  # of SHEET: [s] and [bit]
@@ -82,7 +81,7 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
         folder=searched.store.folder.parents[1],
     )
     results = again.ask()
-    answer = Answer(again, results)
+    answer = FleetAnswer(results, again)
     best = search_of(results).best
     missions = results.missions[results.missions["point"] == best.points[0]]
     uavs = results.uavs[results.uavs["point"] == best.points[0]]
@@ -100,18 +99,15 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
         assert {name: row[name] for name in parts} == pytest.approx(parts)
         assert row["gb"] == pytest.approx(gb)
         assert row["cost_per_gb"] == pytest.approx(best.cost / gb)
-    text = search_of(results).sentence()
+    found = found_of(answer.facts())
     ends = f"[{row['cost_low']:,.0f}, {row['cost_high']:,.0f}]"
-    cost = f"for {best.cost:,.0f} EUR a year {ends}"
-    assert f"{cost}: {parts['purchase']:,.0f} EUR for the purchase" in text
-    of_missions = f"(battery packs {parts['packs']:,.0f} EUR, hours {parts['hours']:,.0f} EUR"
-    assert f"{of_missions} and lost UAVs 0.00 EUR)" in text
-    assert "for 200 missions (" in text
-    assert f"{best.cost / gb / 1000:,.2f} EUR per MB collected" in text
-    assert f"; to buy it costs {2 * parts['purchase']:,.0f} EUR." in text
-    assert "paid off over 2 years at 0 % interest; the fleet makes 200 missions a year" in (
-        " ".join(answer.answers())
-    )
+    assert found["cost"] == f"{best.cost:,.0f} {ends} EUR a year"
+    assert found["of it for the purchase"] == f"{parts['purchase']:,.0f} EUR"
+    of_missions = f"battery packs {parts['packs']:,.0f} EUR, hours {parts['hours']:,.0f} EUR"
+    assert f": {of_missions}, lost UAVs 0.00 EUR" in found["of it for 200 missions"]
+    assert found["cost of data"] == f"{best.cost / gb / 1000:,.2f} EUR per MB collected"
+    assert found["price when bought"] == f"{2 * parts['purchase']:,.0f} EUR"
+    assert "over 2 years at 0 % interest; 200 missions a year" in found["paid for"]
     assert "Cost [EUR a year]" in answer.brief_tables()[0].cells
     assert "--price years=2" in again.command
 
@@ -128,9 +124,7 @@ def test_the_rule_of_thumb_takes_its_numbers_from_the_missions_of_the_answer(sea
     assert rule.flying == pytest.approx(uavs["slots_flying"].sum() / missions["slots"].sum())
     assert rule.flight == pytest.approx(uavs["slots_flying"].sum() / flights * SLOT)
     assert rule.recovery == pytest.approx(charge + wait)
-    assert rule.sentence(searched.scenario(best.points[0]).uavs[1]) in (
-        search_of(searched).sentences()
-    )
+    assert rule.in_words == found_of(search_of(searched).facts())["rule of thumb"]
 
 
 def test_each_uav_is_charged_at_the_rate_of_its_type():
@@ -146,21 +140,19 @@ def test_each_uav_is_charged_at_the_rate_of_its_type():
 def test_the_rule_of_thumb_by_hand():
     rule = RuleOfThumb(flying=1.3, flight=1500, recovery=2200)
     assert rule.uavs == 2 * (2 + 1)
-    text = "asks for 6 UAVs: 2 (ceil(36.7 min / 25 min) + 1), since 1.3 UAVs are in the air"
-    assert all(text in rule.sentence(uavs) for uavs in (5, 6, 7))
-    for uavs, why in ((5, "It rounds up"), (6, "That is the answer"), (7, "does not count UAVs")):
-        assert why in rule.sentence(uavs)
+    assert rule.in_words == "6 UAVs = 2 (ceil(36.7 min / 25 min) + 1); 1.3 in the air"
 
 
 def test_ages_of_missions_of_different_lengths_are_not_compared_without_saying_so(studied):
     results = studied(set={"age.measured": True})
     means = results.missions.groupby("policy")["slots"].mean().round()
-    text = unequal_lengths_sentence(results, [metric_of("age")])
-    assert f"after {means.min():.0f} mission slots to {means.max():.0f} mission slots" in text
-    assert "compared by age of information over missions of different lengths" in text
-    assert unequal_lengths_sentence(results, [metric_of("collection_ratio")]) == ""
+    fact = unequal_lengths(results, [metric_of("age")])
+    ends = f"{means.min():.0f} mission slots to {means.max():.0f} mission slots on average"
+    assert fact.label == "length of missions, compared by age of information"
+    assert fact.found == ends
+    assert unequal_lengths(results, [metric_of("collection_ratio")]).found == ""
     alike = replace(results, missions=results.missions.assign(slots=480))
-    assert unequal_lengths_sentence(alike, [metric_of("age")]) == ""
+    assert unequal_lengths(alike, [metric_of("age")]).found == ""
 
 
 def test_without_a_sheet_nothing_is_told_in_units(studied):
@@ -173,7 +165,7 @@ def test_lengths_and_data_of_a_question_are_in_units(tmp_path):
     scenario = write_scenario(tmp_path, **SHEET)
     longer = {"data_sheet.endurance": "70 min"}  # a slot is twice as long
     question = what_if_question(longer, None, scenario, ["greedy"], 3, folder=tmp_path)
-    answer = Answer(question, question.ask())
+    answer = VariationAnswer(question.ask(), question)
     table = answer.table().set_index("metric")
     assert table.loc["slots_h", ["before", "after"]].tolist() == pytest.approx([2, 2], rel=0.02)
     rows = answer.variation.measures("greedy")["Mean per mission"].tolist()
@@ -197,10 +189,11 @@ def test_an_age_is_required_to_be_at_most(column, age, verdict):
 
 
 def test_the_answer_has_every_requirement_in_its_unit(searched):
-    text = " ".join(search_of(searched).sentences())
-    assert " min (at most 50 min required)" in text
+    facts = {fact.label: fact for fact in search_of(searched).facts()}
+    age = facts["age of information"]
     # Half a percent of two hours more.
-    assert "its age of information is at most 50.6 min" in text
+    assert (age.required, age.guaranteed) == ("at most 50 min", "at most 50.6 min")
+    text = str(facts)
     assert not re.search(r"\d h\b", text)
     # A mission with a sheet ends on the ground.
     assert "way home" not in text
@@ -265,11 +258,11 @@ def test_the_fleet_is_asked_about_with_one_more(searched):
         column = measure.name
         assert [text.split("(")[1].split()[0] for text in cells[column][1:]] == told
     assert data["lead"][1:].is_monotonic_increasing
-    # One more UAV, in a sentence of the answer.
+    # One more UAV, among the facts of the answer.
     more_uavs = data["change"].tolist().index(f"{first['uavs'] + 1} UAVs")
     more = data["cost"][more_uavs] - data["cost"][0]
-    text = around.one_more_sentence(searched)
-    assert text.startswith(f"One more UAV, which flies all day, costs {more:,.0f} EUR more; ")
+    ((label, text),) = found_of(around.one_more_facts(searched)).items()
+    assert label == "one more UAV" and text.startswith(f"+{more:,.0f} EUR; ")
     tightest = search_of(searched).best.tightest_first[0].metric
     change = cells[tightest.name][more_uavs].split("(")[1].rstrip(")")
     assert change in text
@@ -317,7 +310,7 @@ def fly_check(searched, missions, **changes):
 @pytest.fixture(scope="module")
 def limited(searched):
     """The limits of the fleet by eight missions."""
-    assert limits.limit_sentences(searched) == []
+    assert limits.limit_facts(searched) == []
     folder = searched.store.folder.parents[1]
     limits.find_limits(searched, str(folder / "small.toml"), missions=8)
     return {limit.field.split(".")[1]: limit for limit in limits.limits_of(searched).limits}
@@ -336,13 +329,14 @@ def test_the_limits_of_the_fleet_are_where_its_missions_break_a_requirement(
             size = SLOT / 3600 if column == "age" else 1.0
             change = means[column] * size - checks[requirement.column][:8].mean()
             assert requirement.margin(checks[requirement.column].mean() + change) >= 0
-    first, *_, last = limits.limit_sentences(searched)
-    assert first.startswith("What breaks it first is ")
-    assert not last.startswith("Wind was not asked")
+    found = found_of(limits.limit_facts(searched))
+    assert len(found) == 4 and "8 missions" in found["limits found on"]
     known = limits.limits_of(searched)
     without_wind = known.model_copy(update={"has_wind": False})
     monkeypatch.setattr(limits, "limits_of", lambda _: without_wind)
-    assert limits.limit_sentences(searched)[-1] == "Wind was not asked: the sheet has no max_speed."
+    assert (
+        "not asked: the sheet has no max_speed" in found_of(limits.limit_facts(searched)).values()
+    )
 
 
 def test_the_limit_of_failures_is_that_of_many_missions(searched, limited):
@@ -421,45 +415,25 @@ SMALL = limit("data_rate", "2 kB/h", "8.8 kB/h", 4.4, "success").model_copy(
 )
 
 
-@pytest.mark.parametrize(("found", "start", "end"), [
-    (
-        (WIND, FAILURES, DATA),
-        "What breaks it first is the wind: up to 8 m/s from N, the worst of 8 directions (8 m/s "
-        "from SW is assumed); in more wind from there, the UAVs of the data sheet cannot fly. "
-        "Limits are found on 30 missions of the check, that of failures on three times as many.",
-        "The data: up to 24 MB/h (3 MB/h is assumed); no more was tried.",
-    ),
-    (
-        (ROUGH, FAILURES, DATA),
-        "What breaks it first is the wind: up to about 7 m/s from SE, the worst of 8 directions (8 "
-        "m/s from SW is assumed); beyond it, the age of information breaks its requirement. ",
-        "The data: up to 24 MB/h (3 MB/h is assumed); no more was tried.",
-    ),
-    (
-        (DATA,),
-        "Nothing that was tried breaks it. The data: up to 24 MB/h (3 MB/h is assumed); no more",
-        "Wind was not asked: the sheet has no max_speed.",
-    ),
-    (
-        (SMALL,),
-        "What breaks it first is the data: up to 8.8 kB/h (2 kB/h is assumed); beyond it, the "
-        "success breaks its requirement, as UAVs are lost at zones.0, which has 1 cell for 2 UAVs.",
-        "Wind was not asked: the sheet has no max_speed.",
-    ),
-    (
-        (FAILURES,),
-        "What breaks it first is failures: not even one every 100000 h of a UAV's flying (none is "
-        "assumed); beyond it, the success breaks its requirement.",
-        "Wind was not asked: the sheet has no max_speed.",
-    ),
+@pytest.mark.parametrize(("limit", "said"), [
+    (WIND, "8 m/s from N, the worst of 8 directions (8 m/s from SW assumed); beyond it, UAVs "
+     "cannot fly"),
+    (ROUGH, "about 7 m/s from SE, the worst of 8 directions (8 m/s from SW assumed); beyond it, "
+     "the age of information breaks"),
+    (DATA, "24 MB/h (3 MB/h assumed); no more was tried"),
+    (SMALL, "8.8 kB/h (2 kB/h assumed); beyond it, the success breaks, as UAVs are lost at "
+     "zones.0, which has 1 cell for 2 UAVs"),
+    (FAILURES, "not even one every 100000 h (none assumed); beyond it, the success breaks"),
 ])  # fmt: skip
-def test_limits_are_told_in_sentences(found, start, end, monkeypatch):
-    document = limits.Limits(missions=30, limits=found, has_wind=found[0].field.endswith("wind"))
+def test_a_limit_is_told_with_what_is_assumed_and_what_ends_it(limit, said, monkeypatch):
+    document = limits.Limits(missions=30, limits=(limit,), has_wind=True)
     monkeypatch.setattr(limits, "limits_of", lambda results: document)
-    first, *_, last = limits.limit_sentences(None)
-    assert first.startswith(start)
-    assert last == end
-    assert [*found] == sorted([*found][::-1], key=limits._order_of)
+    assert limits.limit_facts(None)[0].found == said
+
+
+def test_the_limit_that_breaks_something_nearest_is_told_first():
+    for found in [(WIND, FAILURES, DATA), (ROUGH, FAILURES, DATA)]:
+        assert [*found] == sorted([*found][::-1], key=limits._order_of)
 
 
 class _Onward:
@@ -496,10 +470,10 @@ def test_a_limit_names_the_small_zone_at_which_uavs_are_lost(action, cells, told
 def test_the_risk_is_told_of_the_missions_of_the_check(searched):
     best = search_of(searched).best
     checks = searched.checks[searched.checks["point"] == best.points[0]]
-    text = risk_sentence(searched, best.policy, best.points)
-    assert text.startswith("In 0 of 20 missions that check it, a UAV is lost; in the worst tenth")
-    assert f"the data are {60 * checks['age_h'].quantile(0.9):.4g} min old or older." in text
-    assert brief_sentences(searched)[0] == text
+    found = found_of(risk_facts(searched, best.policy, best.points))
+    assert found["missions with a lost UAV"] == "0 of 20"
+    oldest = f"{60 * checks['age_h'].quantile(0.9):.4g} min"
+    assert found["worst 10 % of the missions"] == f"age of information {oldest} or more"
 
 
 def test_a_repair_of_0_reads_as_what_it_is():
@@ -520,11 +494,11 @@ def test_fields_that_follow_from_the_sheet_are_marked(searched):
     assert marked == set(space.data_sheet.fields()) and "cell_size" in marked
 
 
-def test_ten_lines_say_what_is_assumed(searched):
-    lines = assumption_sentences(searched)
-    assert len(lines) == 10
-    assert lines[1].startswith("A slot is 21 s, a hundredth of the endurance of 35 min")
-    assert lines[2].startswith("A cell is 315 m wide, the way of a slot at 15 m/s.")
+def test_what_is_assumed_has_the_numbers_of_the_sheet(searched):
+    found = found_of(assumption_facts(searched))
+    assert found["slot"].startswith("21 s, a hundredth of the endurance of 35 min")
+    assert found["cell"] == "315 m wide, the way of a slot at 15 m/s"
+    assert found["charging"] == "from empty to full in 40 min"
 
 
 def test_a_limit_is_told_in_the_unit_of_the_sheet():

@@ -2,14 +2,14 @@
 
     results = load_results("results/fleets")  # of a study that searches for the cheapest fleet
     search = search_of(results)
-    search.sentence()  # in words
+    search.headline(), search.facts()
     tables.fleet_table(results)  # the fleets by cost, with the answer marked
 
 A fleet is searched for every policy and under every condition and, if there are several conditions,
 under all of them together. The answer is the cheapest fleet of any policy under all conditions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,11 +18,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
-from dess.analysis.answers.fleet.costs import (
-    cost_parts_in_words,
-    mean_cost_parts,
-    prices_in_words,
-)
+from dess.analysis.answers.fleet.costs import cost_facts, mean_cost_parts
 from dess.analysis.answers.fleet.requirements import (
     least_spare,
     metric_asked_for,
@@ -38,38 +34,28 @@ from dess.analysis.answers.fleet.verdicts import (
     judge_settings,
     quoted_settings,
 )
-from dess.analysis.answers.settings.home import (
-    may_end_in_the_air,
-    stranded_sentence,
-    way_home_sentence,
-)
-from dess.analysis.answers.settings.nodes import hardly_served_clause
+from dess.analysis.answers.settings.home import may_end_in_the_air
+from dess.analysis.answers.settings.nodes import hardly_served_nodes
 from dess.analysis.answers.settings.points import (
     conditions_in_words,
+    ends_in_words,
     ends_of_point,
-    ends_sentence,
     fleets_in_words,
     values_of_points,
 )
-from dess.analysis.answers.settings.ranking import unequal_lengths_sentence
+from dess.analysis.answers.settings.ranking import unequal_lengths
+from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import COST, HOME, SUCCESS, Metric, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.requirement import Requirement
-from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice, CheapestSetting
 from dess.analysis.study.prices import has_priced_types
 from dess.scenario.fields import ZONE_PADS
 
-_WHY_NOT = {
-    Verdict.MET: "meets the requirements as well, and saves less than matters",
-    Verdict.OPEN: "is not known to meet the requirements",
-    Verdict.MISSED: "misses the requirements",
-}
-
 
 @dataclass(frozen=True, eq=False)
-class FleetAnswer:
+class CheapestFleet:
     """The cheapest fleet of a policy under one condition, or under all conditions together.
 
     Attributes:
@@ -150,7 +136,7 @@ class FleetAnswer:
     def estimates(self, column: str) -> pd.Series:
         """The mean of a metric of the fleet with its interval, under its worst condition.
 
-        All sentences on the fleet take their numbers from here, from ``quoted_settings``.
+        All facts on the fleet take their numbers from here, from ``quoted_settings``.
 
         Args:
             column: The column of the metric.
@@ -166,7 +152,7 @@ class FleetAnswer:
             worst = rows[column].idxmin()
         return rows.loc[worst]
 
-    # --- sentences ---
+    # --- facts ---
 
     @property
     def cost_in_words(self) -> str:
@@ -174,133 +160,109 @@ class FleetAnswer:
         return numbers.format_money(self.cost, self.results.prices.unit)
 
     @property
-    def _ends_of_cost_in_words(self) -> str:
-        """The interval of the mean cost, to follow it; empty if it is the same in all missions."""
-        selected = self.fleets[self.fleets["selected"]]
-        estimate, *ends = selected[interval_columns(COST)].iloc[0]
-        if ends[0] == ends[1]:
-            return ""
-        _, interval = metric_of(COST).written(estimate, *ends).split(" ", 1)
-        return f" {interval}"
+    def summary(self) -> str:
+        """The fleet and its cost; that none is known to meet the requirements if there is none."""
+        if self.points:
+            return f"{self.fleet}, {self.cost_in_words}"
+        return "no fleet is known to meet the requirements"
 
-    @property
-    def _where(self) -> str:
-        """The policy and the condition, as the beginning of a sentence."""
-        where = f"With the policy `{self.policy}`"
-        if self.condition:
-            where += f" and under {self.condition}"
-        return where
-
-    def choice_sentence(self) -> str:
-        """Which fleet is the cheapest that meets the requirements, and what it costs."""
-        if not self.points:
-            return f"{self._where}, no fleet is known to meet the requirements."
-        parts = cost_parts_in_words(self.results, self.policy, self.points)
-        return (
-            f"{self._where}, the cheapest fleet that meets the requirements is **{self.fleet}** "
-            f"for {self.cost_in_words}{self._ends_of_cost_in_words}{parts}"
-            f"{hardly_served_clause(self.results, self.policy, self.points)}."
-        )
-
-    def estimates_sentence(self) -> str:
-        """What was measured of the fleet, beside what is required; that with the least spare first.
-
-        Of a fleet whose success is not required, the sentence says what it is.
-        """
-        if not self.points:
-            return ""
-        texts = []
-        for requirement in self.tightest_first:
-            texts.append(
-                f"its {requirement.metric.within} is {self._measured(requirement.column)} "
-                f"({requirement.bound_in_words} required)"
-            )
-        if SUCCESS not in [requirement.column for requirement in self.tightest_first]:
-            texts.append(f"its success is {self._measured(SUCCESS)} (none is required)")
-        missions = f"{int(self.estimates(SUCCESS)['n']):,} missions"
-        is_checked = not self.results.checks.empty
-        if is_checked:
-            source = f"{missions} that check it"
-        else:
-            source = f"the {missions} of the search"
-        if len(self.points) > 1:
-            where = ", under the worst condition for each,"
-        else:
-            where = ","
-        text = f"In {source}{where} {numbers.join_words(texts)}."
-        if len(self.tightest_first) > 1:
-            text += f" Nearest to what is required is its {self.tightest_first[0].metric.within}."
-        return text
-
-    def measured_in_words(self) -> str:
-        """What was measured of it by each requirement, as ``success 99.7 % [98.1, 99.9]``."""
-        texts = [
-            f"{requirement.metric.within} {self._measured(requirement.column)}"
-            for requirement in self.tightest_first
-        ]
-        return numbers.join_words(texts)
-
-    def _measured(self, column: str) -> str:
-        """The mean of a metric of the fleet and its interval, in words."""
+    def measured(self, column: str) -> str:
+        """The mean of a metric of the fleet and its interval, as text."""
         row = self.estimates(column)
         return metric_asked_for(self.results, column).written(*row[interval_columns(column)])
 
-    def home_sentence(self) -> str:
-        """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
-        if not self.points or not may_end_in_the_air(self.results):
-            return ""
-        row = self.estimates(HOME)
-        share = way_home_sentence(*row[interval_columns(HOME)])
-        parts = mean_cost_parts(self.results)
-        rows = parts[(parts["policy"] == self.policy) & parts["point"].isin(self.points)]
-        return f"{share} {stranded_sentence(self.results, rows['stranded'].mean())}".strip()
-
-    def guarantee_sentence(self, policies: int = 1) -> str:
-        """What the search has shown of the fleet, with its probability.
+    def facts(self, policies: int = 1) -> list[Fact]:
+        """The fleet by every requirement, its cost, and why it is not a cheaper one.
 
         Args:
             policies: Of how many policies the fleet is the cheapest.
         """
         if not self.points:
-            return ""
+            return known_facts([self._cheaper_fact(), self._undecided_fact()])
+        return known_facts(
+            [
+                *self._requirement_facts(policies),
+                *self._home_facts(),
+                self._missions_fact(),
+                *self._cost_facts(),
+                self._cheaper_fact(),
+                Fact(
+                    "hardly served",
+                    hardly_served_nodes(self.results, self.policy, self.points),
+                ),
+                self._ends_fact(),
+                self._undecided_fact(),
+            ]
+        )
+
+    def _requirement_facts(self, policies: int) -> Iterator[Fact]:
+        """What was measured beside what is required, that with the least to spare first."""
         rule = self.results.study.selection
         assert isinstance(rule, Cheapest)
         horizon = self.results.store.manifest.settings[self.points[0]].horizon
-        shifted = [requirement.shifted(rule.tolerance, horizon) for requirement in self._required]
-        shown = [f"its {bound.metric.within} is {bound.bound_in_words}" for bound in shifted]
-        where = ""
+        for requirement in self.tightest_first:
+            yield Fact(
+                requirement.metric.within,
+                self.measured(requirement.column),
+                requirement.bound_in_words,
+                requirement.shifted(rule.tolerance, horizon).bound_in_words,
+            )
+        if SUCCESS not in [requirement.column for requirement in self.tightest_first]:
+            yield Fact("success", self.measured(SUCCESS))
+        everywhere = ""
         if self._answer.condition is None:
-            where = " under every condition"
+            everywhere = ", under every condition"
         sure = numbers.format_level(rule.shown(policies))
-        return f"With a probability of at least {sure}, {numbers.join_words(shown)}{where}."
+        yield Fact("probability of what is guaranteed", f"at least {sure}{everywhere}")
 
-    def ends_sentence(self) -> str:
+    def _home_facts(self) -> Iterator[Fact]:
+        """Whether the UAVs of the fleet could fly home, where missions may end in the air."""
+        if not may_end_in_the_air(self.results):
+            return
+        yield Fact(metric_of(HOME).within, self.measured(HOME))
+        parts = mean_cost_parts(self.results)
+        rows = parts[(parts["policy"] == self.policy) & parts["point"].isin(self.points)]
+        stranded = rows["stranded"].mean()
+        if stranded > 0:
+            number = numbers.format_quantity(round(stranded, 2))
+            yield Fact("UAVs without it, which have no price", f"{number} of a mission")
+
+    def _missions_fact(self) -> Fact:
+        """On which missions the fleet was measured."""
+        missions = numbers.format_count(int(self.estimates(SUCCESS)["n"]), "mission")
+        source = "of the search"
+        if not self.results.checks.empty:
+            source = "that check it"
+        if len(self.points) > 1:
+            source += ", under the worst condition for each metric"
+        return Fact("measured in", f"{missions} {source}")
+
+    def _cost_facts(self) -> Iterator[Fact]:
+        """The cost of the fleet with its interval, and its parts."""
+        selected = self.fleets[self.fleets["selected"]]
+        ends = selected[interval_columns(COST)].iloc[0]
+        amount = metric_of(COST).written(*ends)
+        yield Fact("cost", f"{amount} {self.results.prices.unit}")
+        yield from cost_facts(self.results, self.policy, self.points)
+
+    def _ends_fact(self) -> Fact:
         """At which ends of the values asked for the fleet lies, beyond which one may be cheaper."""
-        if not self.points:
-            return ""
         point = self.points[0]
-        return ends_sentence(
-            self.results, point, _ends_of_values(self.results, point), "a cheaper one"
-        ).strip()
+        ends = ends_in_words(self.results, point, _ends_of_values(self.results, point))
+        return Fact("a cheaper one may lie beyond", ends)
 
-    def budget_sentence(self) -> str:
-        """Which pair the budget left undecided, and about how many missions would settle it."""
+    def _undecided_fact(self) -> Fact:
+        """Which fleet the budget left undecided, and about how many missions would settle it."""
         choice = self._choice
-        rule = self.results.study.selection
         if not choice.done or self._answer.settled:
-            return ""
-        assert isinstance(rule, Cheapest)
+            return Fact("undecided", "")
+        enough = "far more missions"
         if choice.enough:
             enough = f"about {float(f'{choice.enough:.2g}'):,.0f} missions"
-        else:
-            enough = "far more"
-        return (
-            f"The budget of {rule.budget:,} missions ended before it was decided whether "
-            f"{self._undecided_in_words()}; {enough} would settle it."
-        )
+        return Fact("undecided", f"{self._undecided_in_words()}; {enough} would settle it")
 
     def _undecided_in_words(self) -> str:
-        """The pair of a fleet and the policy that may change the answer, and how many others may.
+        """The fleet that may change the answer, and how many others may.
 
         It is the cheapest of those that are left beside the answer; without an answer, the one that
         is the closest to the requirements.
@@ -313,19 +275,13 @@ class FleetAnswer:
             row = rows.sort_values(COST, kind="stable").iloc[0]
         else:
             row = rows.loc[least_spare(rows, self._required).idxmax()]
-        if row["verdict"] == Verdict.MET:
-            what = "costs less"
-        else:
-            what = "meets the requirements"
-        text = f"**{row['fleet']}** with the policy `{self.policy}` {what}"
         if len(left) > 1:
-            text += f" ({numbers.format_count(len(left) - 1, 'other fleet')} may change it too)"
-        return text
+            return f"{row['fleet']}, and {numbers.format_count(len(left) - 1, 'other fleet')}"
+        return str(row["fleet"])
 
-    def cheaper_sentence(self) -> str:
-        """The next cheaper fleet and why it is not the answer; without an answer, the closest."""
-        selected = self.fleets[self.fleets["selected"]]
-        if len(selected):
+    def _cheaper_fact(self) -> Fact:
+        """The next cheaper fleet and its verdict; without an answer, the closest."""
+        if self.points:
             other = self.fleets[self.fleets[COST] < self.cost].tail(1)
             which = "next cheaper"
         else:
@@ -333,45 +289,16 @@ class FleetAnswer:
             other = self.fleets.loc[nearest]
             which = "closest"
         if other.empty:
-            return ""
+            return Fact(which, "")
         row = other.iloc[0]
         amount = numbers.format_money(row[COST], self.results.prices.unit)
-        measured = [
-            f"{r.metric.within} {r.metric.written(*row[interval_columns(r.column)])}"
-            for r in self._required
-        ]
-        return (
-            f"The {which} one, **{row['fleet']}** for {amount} with "
-            f"{numbers.join_words(measured)}, {_WHY_NOT[row['verdict']]}."
+        tightest = min(
+            self._required,
+            key=lambda requirement: relative_spare(self.fleets, requirement)[row.name],
         )
-
-    def rule_of_thumb_sentence(self) -> str:
-        """How many UAVs a rule of thumb asks for; empty without a fleet or a data sheet."""
-        if not self.points:
-            return ""
-        rule = rule_of_thumb(self.results, self.policy, self.points)
-        if rule is None:
-            return ""
-        return rule.sentence(self.results.scenario(self.points[0]).uavs[1])
-
-    def headline(self) -> str:
-        """The fleet, its cost, what was measured of it, and whether its UAVs could fly home."""
-        parts = [self.choice_sentence(), self.estimates_sentence(), self.home_sentence()]
-        return " ".join(filter(None, parts))
-
-    def reasons(self, policies: int = 1) -> str:
-        """How sure the answer is, and why it is not a cheaper fleet.
-
-        Args:
-            policies: Of how many policies the fleet is the cheapest.
-        """
-        parts = [
-            self.guarantee_sentence(policies),
-            self.ends_sentence(),
-            self.budget_sentence(),
-            self.cheaper_sentence(),
-        ]
-        return " ".join(filter(None, parts))
+        ends = row[interval_columns(tightest.column)]
+        measured = f"{tightest.metric.within} {tightest.metric.written(*ends)}"
+        return Fact(f"{which} ({row['verdict']})", f"{row['fleet']}, {amount}; {measured}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,25 +312,25 @@ class FleetSearch:
     results: Results
 
     @cached_property
-    def fleet_answers(self) -> list[FleetAnswer]:
+    def fleet_answers(self) -> list[CheapestFleet]:
         """The answers of every policy: one for each condition, then one for all of them."""
         conditions = [*dict.fromkeys(conditions_in_words(self.results))]
         if len(conditions) > 1:
             conditions.append(ALL_CONDITIONS)
         return [
-            FleetAnswer(self.results, policy, condition, number)
+            CheapestFleet(self.results, policy, condition, number)
             for policy in self.results.policies
             for number, condition in enumerate(conditions)
         ]
 
     @property
-    def answers_for_all_conditions(self) -> list[FleetAnswer]:
+    def answers_for_all_conditions(self) -> list[CheapestFleet]:
         """The answer of every policy for all conditions."""
         of_policies = {answer.policy: answer for answer in self.fleet_answers}
         return [*of_policies.values()]
 
     @cached_property
-    def best(self) -> FleetAnswer:
+    def best(self) -> CheapestFleet:
         """The cheapest fleet of any policy under all conditions; that of the first one if none.
 
         Of fleets that cost the same, it is the one that keeps the requirements with more to spare.
@@ -412,7 +339,7 @@ class FleetSearch:
         fleets = pd.concat([answer.fleets for answer in answers])
         spare = least_spare(fleets, requirements_of(self.results))
 
-        def cost_and_need(answer: FleetAnswer) -> tuple[float, float]:
+        def cost_and_need(answer: CheapestFleet) -> tuple[float, float]:
             selected = answer.fleets.index[answer.fleets["selected"]]
             return answer.cost, -spare[selected].max()
 
@@ -437,54 +364,46 @@ class FleetSearch:
         is_policy = missions["policy"] == self.best.policy
         return missions[is_policy & (missions["point"] == self.shown_point)]
 
-    # --- sentences ---
+    # --- facts ---
 
-    def sentence(self) -> str:
-        """The cheapest fleet of all policies, and which the others would have named."""
-        return " ".join([self.best.headline(), *self.other_policies_sentences()])
+    def headline(self) -> str:
+        """What to buy, and what it costs."""
+        if not self.best.points:
+            return "No fleet is known to meet the requirements."
+        prices = self.results.prices
+        missions = ""
+        if prices.pays_for_missions and prices.years is None:
+            missions = f" with {numbers.format_count(prices.paid_missions, 'mission')}"
+        return f"Buy {self.best.fleet}: {self.best.cost_in_words}{missions}."
 
-    def other_policies_sentences(self) -> list[str]:
-        """For each other policy, what its cheapest fleet is, so how much depends on the policy."""
-        sentences = []
-        for other in self.answers_for_all_conditions:
-            if other.policy == self.best.policy:
+    def facts(self) -> list[Fact]:
+        """The answer by every requirement, and the answers of other policies and conditions."""
+        best = self.best
+        facts = [Fact("policy", best.policy), *best.facts(len(self.results.policies))]
+        for other in self.fleet_answers:
+            if other is best:
                 continue
-            if other.fleet == self.best.fleet:
-                if self.best.points:
-                    sentences.append(
-                        f"With the policy `{other.policy}`, it is the same fleet, with "
-                        f"{other.measured_in_words()}."
-                    )
-            elif other.points:
-                sentences.append(
-                    f"With the policy `{other.policy}`, it would be **{other.fleet}** for "
-                    f"{other.cost_in_words}."
-                )
-            else:
-                sentences.append(
-                    f"With the policy `{other.policy}`, no fleet is known to meet the requirements."
-                )
-        return sentences
+            where = f"with {other.policy}"
+            if other.condition:
+                where += f", {other.condition}"
+            measured = ""
+            if other.points:
+                tightest = other.tightest_first[0]
+                measured = f"; {tightest.metric.within} {other.measured(tightest.column)}"
+            facts.append(Fact(where, f"{other.summary}{measured}"))
+        lengths = unequal_lengths(self.results, best.length_dependent_metrics)
+        return known_facts([*facts, lengths, self._rule_of_thumb_fact()])
 
-    def reason_sentences(self) -> list[str]:
-        """How sure the answer is; then the answers of the other policies and conditions."""
-        lines = [
-            self.best.reasons(len(self.results.policies)),
-            self.best.rule_of_thumb_sentence(),
-            unequal_lengths_sentence(self.results, self.best.length_dependent_metrics),
-        ]
-        lines += [
-            f"{other.headline()} {other.reasons()}".strip()
-            for other in self.fleet_answers
-            if other is not self.best
-        ]
-        return [line for line in lines if line]
+    def _rule_of_thumb_fact(self) -> Fact:
+        """How many UAVs a rule of thumb asks for."""
+        rule = None
+        if self.best.points:
+            rule = rule_of_thumb(self.results, self.best.policy, self.best.points)
+        if rule is None:
+            return Fact("rule of thumb", "")
+        return Fact("rule of thumb", rule.in_words)
 
-    def sentences(self) -> list[str]:
-        """The answer, what is paid for, how sure it is, and the other answers."""
-        return [self.sentence(), prices_in_words(self.results), *self.reason_sentences()]
-
-    def guarantee_sentences(self) -> list[str]:
+    def guarantees(self) -> list[str]:
         """What is guaranteed about the selected fleets of every policy; none without a search."""
         choices = [self.results.cheapest(policy) for policy in self.results.policies]
         return [*dict.fromkeys(choice.guarantee for choice in choices if choice)]

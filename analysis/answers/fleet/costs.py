@@ -1,7 +1,7 @@
 """What fleets cost: their purchase, their missions, and the Pareto front of cost and a metric.
 
     results = load_results("results/fleets")  # of a study with a table [costs]
-    prices_in_words(results)  # what is paid for
+    price_facts(results)  # what is paid for
     cost_front(results, "success")  # cost and success, with the probability of being on the front
 
 A setting is a policy at a design point, which is a fleet under a condition. Fleets are compared
@@ -21,6 +21,7 @@ from dess.analysis.answers.settings.points import (
     intervals_in_words,
 )
 from dess.analysis.answers.settings.ranking import rank_settings
+from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
     COLLECTED,
     COST,
@@ -71,9 +72,27 @@ def priced_settings(results: Results) -> pd.DataFrame:
     return table.sort_values("condition", ignore_index=True, **order)
 
 
-def prices_in_words(results: Results) -> str:
+def price_facts(results: Results) -> list[Fact]:
     """What is paid for, and what for nothing."""
-    return results.prices.words_on(results.store.manifest.scenarios)
+    prices = results.prices
+    amounts = prices.amounts_on(results.store.manifest.scenarios)
+    paid = [f"{thing} {amount}" for thing, amount in amounts.items() if amount]
+    free = [thing for thing, amount in amounts.items() if not amount]
+    missions = numbers.format_count(prices.paid_missions, "mission")
+    planned = ""
+    if prices.years is not None:
+        planned = f"{prices.annuity_in_words}; {missions} a year"
+        if prices.pack:
+            planned += f"; a pack is worn after {prices.pack_cycles:g} full charges"
+    elif prices.pays_for_missions:
+        planned = f"the purchase and {missions}"
+    return known_facts(
+        [
+            Fact("prices", ", ".join(paid)),
+            Fact("paid for", planned),
+            Fact("without a price", ", ".join(free)),
+        ]
+    )
 
 
 @compute_once
@@ -179,8 +198,8 @@ def format_amount(value: float) -> str:
     return numbers.format_amounts(value, value, value)
 
 
-def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> str:
-    """The parts of the cost of a fleet, to follow it; empty if only the purchase is paid for.
+def cost_facts(results: Results, policy: str, fleet: Sequence[int]) -> list[Fact]:
+    """The parts of the cost of a fleet, and what a unit of data costs; none if it has no parts.
 
     Args:
         results: The study.
@@ -190,46 +209,46 @@ def cost_parts_in_words(results: Results, policy: str, fleet: Sequence[int]) -> 
     prices = results.prices
     table = mean_cost_parts(results)
     rows = table[(table["policy"] == policy) & table["point"].isin(fleet)]
-    end = _cost_per_gb_in_words(results, rows)
-    if prices.years is not None:
-        price = prices.price_of_fleet(results.scenario(fleet[0]))
-        end += f"; to buy it costs {numbers.format_money(price, prices.currency)}"
-    if not prices.pays_for_missions:
-        return end
-    means = rows[[*prices.part_names]].mean()
 
     def money(value: float) -> str:
         return numbers.format_money(value, prices.currency)
 
-    running = [
-        f"{name} {money(means[part])}"
-        for part, name in _PART_NAMES.items()
-        if part in prices.paid_parts
-    ]
-    total = money(means.sum() - means[PURCHASE])
-    return (
-        f": {money(means[PURCHASE])} for the purchase and {total} for "
-        f"{numbers.format_count(prices.paid_missions, 'mission')} "
-        f"({numbers.join_words(running)}){end}"
-    )
+    facts = []
+    if prices.pays_for_missions:
+        means = rows[[*prices.part_names]].mean()
+        running = [
+            f"{name} {money(means[part])}"
+            for part, name in _PART_NAMES.items()
+            if part in prices.paid_parts
+        ]
+        missions = numbers.format_count(prices.paid_missions, "mission")
+        total = money(means.sum() - means[PURCHASE])
+        facts.append(Fact("of it for the purchase", money(means[PURCHASE])))
+        facts.append(Fact(f"of it for {missions}", f"{total}: {', '.join(running)}"))
+    facts.append(_cost_per_gb(results, rows))
+    if prices.years is not None:
+        price = prices.price_of_fleet(results.scenario(fleet[0]))
+        facts.append(Fact("price when bought", money(price)))
+    return known_facts(facts)
 
 
-def _cost_per_gb_in_words(results: Results, rows: pd.DataFrame) -> str:
-    """What a GB, MB or kB costs, to follow the cost of a year; empty where that is not known.
+def _cost_per_gb(results: Results, rows: pd.DataFrame) -> Fact:
+    """What a GB, MB or kB costs, where costs are those of a year.
 
     Args:
         results: The study.
         rows: Rows of ``mean_cost_parts`` of a fleet, one for each condition.
     """
     if "gb" not in rows or not rows["gb"].sum():
-        return ""
+        return Fact("cost of data", "")
     per_unit = rows[COST].mean() / rows["gb"].mean()
     unit = "GB"
     for smaller in ("MB", "kB"):
         if per_unit >= _MOST_PER_UNIT:
             per_unit /= 1000
             unit = smaller
-    return f", or {numbers.format_money(per_unit, results.prices.currency)} per {unit} collected"
+    amount = numbers.format_money(per_unit, results.prices.currency)
+    return Fact("cost of data", f"{amount} per {unit} collected")
 
 
 def _mission_values(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:

@@ -6,14 +6,15 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.requirements import metric_asked_for, requirements_of
+from dess.analysis.facts import Fact
 from dess.analysis.metrics import AGE, RATIO, column_in_sheet_unit, metric_of
 from dess.analysis.results.tables import Results
 
 _WORST = 0.1  # the share of the missions that are called the worst
 
 
-def risk_sentence(results: Results, policy: str, points: Sequence[int]) -> str:
-    """In how many missions that check a fleet a UAV is lost, and how old the data are in the worst.
+def risk_facts(results: Results, policy: str, points: Sequence[int]) -> list[Fact]:
+    """In how many missions that check a fleet a UAV is lost, and how bad the worst of them are.
 
     Args:
         results: A study that searches for the cheapest setting.
@@ -21,16 +22,18 @@ def risk_sentence(results: Results, policy: str, points: Sequence[int]) -> str:
         points: The design points of the fleet, one for each condition; none if there is no fleet.
 
     Returns:
-        The sentence; empty without a fleet or a check.
+        The facts; none without a fleet or a check.
     """
     checks = results.checks
     if not points or checks.empty:
-        return ""
+        return []
     checks = checks[(checks["policy"] == policy) & checks["point"].isin(points)]
     lost = _missions_with_losses(results, policy, points)
-    missions = numbers.format_count(len(checks), "mission")
-    text = f"In {lost:,} of {missions} that check it, a UAV is lost"
-    return f"{text}; {_worst_in_words(results, checks)}."
+    worst = f"worst {numbers.format_level(_WORST)} of the missions"
+    return [
+        Fact("missions with a lost UAV", f"{lost:,} of {len(checks):,}"),
+        Fact(worst, _worst_in_words(results, checks)),
+    ]
 
 
 def _missions_with_losses(results: Results, policy: str, points: Sequence[int]) -> int:
@@ -42,11 +45,11 @@ def _missions_with_losses(results: Results, policy: str, points: Sequence[int]) 
 
 
 def _worst_in_words(results: Results, missions: pd.DataFrame) -> str:
-    """How old the data are in the worst tenth of missions, or how few are collected."""
+    """The age of the data in the worst missions, or the share of the data that they collect."""
     age = column_in_sheet_unit(AGE, missions)
     asked = [requirement.column for requirement in requirements_of(results)]
     if age in asked:
-        oldest = metric_asked_for(results, age).amount(missions[age].quantile(1 - _WORST))
-        return f"in the worst tenth of them, the data are {oldest} old or older"
-    least = metric_of(RATIO).amount(missions[RATIO].quantile(_WORST))
-    return f"in the worst tenth of them, at most {least} of the data are collected"
+        measure = metric_asked_for(results, age)
+        return f"{measure.within} {measure.write(missions[age].quantile(1 - _WORST))} or more"
+    measure = metric_of(RATIO)
+    return f"{measure.within} {measure.write(missions[RATIO].quantile(_WORST))} or less"

@@ -50,32 +50,12 @@ class RuleOfThumb:
     def _spares_of_each(self) -> int:
         return math.ceil(self.recovery / self.flight)
 
-    def sentence(self, uavs: int) -> str:
-        """What the rule says, and why a search may say something else.
-
-        Args:
-            uavs: The number of UAVs that the search has found.
-        """
-        flight = _format_time(self.flight)
-        recovery = _format_time(self.recovery)
-        text = (
-            f"The rule of thumb, active (ceil(recovery / active time) + 1), asks for "
-            f"{numbers.format_count(self.uavs, 'UAV')}: {self._kept_flying} (ceil({recovery} / "
-            f"{flight}) + 1), since {self.flying:.1f} UAVs are in the air on average, a flight "
-            f"takes {flight}, and {recovery} go by until the next one. "
-        )
-        if self.uavs == uavs:
-            return f"{text}That is the answer, though the rule knows no requirement and no pads."
-        if self.uavs > uavs:
-            return (
-                f"{text}It rounds up, to keep {numbers.format_count(self._kept_flying, 'UAV')} in "
-                "the air at every moment even if all batteries empty at once. The requirements do "
-                "not ask for that; the rule knows neither them, nor pads, nor failures."
-            )
-        return (
-            f"{text}It does not count UAVs that stand ready or are under repair, and it knows no "
-            "requirement, no pads and no failures."
-        )
+    @property
+    def in_words(self) -> str:
+        """What the rule says, with its numbers in it."""
+        uavs = numbers.format_count(self.uavs, "UAV")
+        ratio = f"{_format_time(self.recovery)} / {_format_time(self.flight)}"
+        return f"{uavs} = {self._kept_flying} (ceil({ratio}) + 1); {self.flying:.1f} in the air"
 
 
 def _format_time(seconds: float) -> str:

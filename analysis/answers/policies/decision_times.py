@@ -113,7 +113,9 @@ def measure_decision_times(
     costs = []
     for done, policy in enumerate(results.policies, 1):
         try:
-            team = load_team(policy)  # a policy of a Python file is not run
+            # Policies and processes of Python files are not run.
+            results.store.manifest.load_processes(())
+            team = load_team(policy)
         except InputError:
             team = []
         if team:

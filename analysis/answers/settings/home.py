@@ -7,10 +7,8 @@ what is said of a success goes with the share of the missions in which all UAVs 
 
 from collections.abc import Iterable
 
-import pandas as pd
-
 from dess.analysis import numbers
-from dess.analysis.metrics import HOME, PRODUCT, SUCCESS, metric_of
+from dess.analysis.metrics import HOME, SUCCESS
 from dess.analysis.results.tables import Results
 
 
@@ -26,43 +24,6 @@ def with_way_home(results: Results, metrics: Iterable[str]) -> list[str]:
     if SUCCESS in shown and HOME not in shown and may_end_in_the_air(results):
         shown.insert(shown.index(SUCCESS) + 1, HOME)
     return shown
-
-
-def way_home_sentence_of(results: Results, setting: pd.Series, metric: str = SUCCESS) -> str:
-    """In how many missions of a setting all UAVs could fly home; empty where there is no need.
-
-    Args:
-        results: The study.
-        setting: A row of ``ranking.rank_settings``.
-        metric: The metric that is spoken of; only success, and what is made of it, needs this.
-    """
-    if metric not in (SUCCESS, PRODUCT) or not may_end_in_the_air(results):
-        return ""
-    return way_home_sentence(*setting[[HOME, f"{HOME}_low", f"{HOME}_high"]])
-
-
-def way_home_sentence(mean: float, low: float, high: float) -> str:
-    """The sentence on the share of the missions in which all UAVs could fly home."""
-    share = metric_of(HOME).written(mean, low, high)
-    return (
-        f"At the end of {share} of the missions all UAVs have the battery for the way home; with "
-        "landing = true, missions end on the ground."
-    )
-
-
-def stranded_sentence(results: Results, mean: float) -> str:
-    """How many UAVs of a mission cannot fly home, which no price counts; empty if none.
-
-    Args:
-        results: The study.
-        mean: Their mean number, without UAVs that are lost.
-    """
-    if not may_end_in_the_air(results) or not mean > 0:
-        return ""
-    return (
-        f"On average {numbers.format_quantity(round(mean, 2))} UAVs of a mission are left without "
-        "the battery for the way home; no price counts them."
-    )
 
 
 def way_home_range_sentence(results: Results) -> str:

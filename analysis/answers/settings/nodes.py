@@ -16,8 +16,8 @@ HARDLY = 0.1  # a node is hardly served if less than this share of its data is c
 MOST_NAMED = 3  # the largest number of nodes that are named
 
 
-def hardly_served_clause(results: Results, policy: str, points: Sequence[int]) -> str:
-    """Which nodes are hardly served, to follow a sentence on a setting; empty if none is.
+def hardly_served_nodes(results: Results, policy: str, points: Sequence[int]) -> str:
+    """The nodes that are hardly served, with their collection ratios; empty if none is.
 
     Args:
         results: The study.
@@ -38,7 +38,7 @@ def hardly_served_clause(results: Results, policy: str, points: Sequence[int]) -
     ]
     if more := len(order) - len(named):
         parts.append(f"{more:,} more, each below {numbers.format_level(HARDLY)}")
-    return f"; it hardly serves {numbers.join_words(parts)}"
+    return numbers.join_words(parts)
 
 
 def _ratios_of_nodes(results: Results, policy: str, points: Sequence[int]) -> np.ndarray:

@@ -183,22 +183,16 @@ def ends_of_point(results: Results, point: int) -> dict[str, str]:
     return ends
 
 
-def ends_sentence(
-    results: Results, point: int, found: Mapping[str, str], better: str = "a better one"
-) -> str:
-    """A sentence that says at which ends a design point lies; empty if at none.
+def ends_in_words(results: Results, point: int, ends: Mapping[str, str]) -> str:
+    """At which ends of the values asked for a design point lies, as ``1 pad (least)``.
 
     Args:
         results: The study.
         point: The design point.
-        found: Its ``ends_of_point``.
-        better: What may lie beyond.
+        ends: Its ``ends_of_point``.
     """
     values = values_of_points(results).loc[point]
-    named = [f"{field_named(f).words(values[f])} is the {word}" for f, word in found.items()]
-    if not named:
-        return ""
-    return f" Of the values asked for, {numbers.join_words(named)}; {better} may lie beyond."
+    return ", ".join(f"{field_named(f).words(values[f])} ({end})" for f, end in ends.items())
 
 
 def intervals_in_words(results: Results) -> str:

@@ -1,4 +1,4 @@
-"""The settings of a study, the best first, and the sentences and tables on them.
+"""The settings of a study, the best first, and the facts and tables on them.
 
     results = load_results("results/fleets")
     rank_settings(results)  # the best setting first, and those that may be as good
@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers.settings.home import way_home_sentence_of, with_way_home
-from dess.analysis.answers.settings.nodes import hardly_served_clause
+from dess.analysis.answers.settings.home import may_end_in_the_air, with_way_home
+from dess.analysis.answers.settings.nodes import hardly_served_nodes
 from dess.analysis.answers.settings.points import (
+    ends_in_words,
     ends_of_point,
-    ends_sentence,
     intervals_in_words,
     metrics_of_page,
     named_cells,
@@ -27,8 +27,10 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
     varied_values,
 )
+from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
     COST,
+    HOME,
     PRODUCT,
     SUCCESS,
     Metric,
@@ -76,34 +78,22 @@ def ranking_metric(results: Results, metric: str | None = None) -> str:
     return ranking_column(metric, results.missions)
 
 
-def best_settings_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
-    """The best setting, and how many settings may be as good.
+def best_setting_headline(results: Results, table: pd.DataFrame, metric: str) -> str:
+    """The best setting and the mean of its metric, or that of the best policy.
 
     Args:
         results: The study.
         table: The result of ``rank_settings`` for the metric.
         metric: The metric.
     """
-    sentences = best_settings_sentences(results, table, metric)
-    if len(results.policies) == 2:
-        return " ".join(sentences)
-    return sentences[0]
+    best = table.iloc[0]
+    measure = metric_of(metric)
+    name = setting_in_words(results, best["policy"], best["point"])
+    return f"The best is {name}: {measure.within} {measure.write(best[metric])}."
 
 
-def best_settings_sentences(results: Results, table: pd.DataFrame, metric: str) -> list[str]:
-    """The best setting, then what each other policy would have found.
-
-    Args:
-        results: The study.
-        table: The result of ``rank_settings`` for the metric.
-        metric: The metric.
-    """
-    best = best_setting_sentence(results, table, metric)
-    return [best, *other_policies_sentences(results, table, metric)]
-
-
-def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) -> str:
-    """The best setting, how many may be as good, and what else is to be said of it.
+def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> list[Fact]:
+    """The best setting, how the others compare, and what each other policy would have found.
 
     Args:
         results: The study.
@@ -112,109 +102,74 @@ def best_setting_sentence(results: Results, table: pd.DataFrame, metric: str) ->
     """
     measure = metric_of(metric)
     best = table.iloc[0]
-    value = measure.written(*best[[metric, f"{metric}_low", f"{metric}_high"]])
-    name = setting_in_words(results, best["policy"], best["point"])
-    what = "policy"
+    policy = best["policy"]
+    point = best["point"]
+    columns = [measure]
+    if metric in (SUCCESS, PRODUCT) and may_end_in_the_air(results):
+        columns.append(metric_of(HOME))
+    facts = [Fact(each.within, _estimate(best, each)) for each in columns]
+    facts.append(Fact("measured in", numbers.format_count(best["n"], "mission")))
+    facts.append(Fact("hardly served", hardly_served_nodes(results, policy, [point])))
+    facts += _comparison_facts(results, table.iloc[1:])
+    ends = ends_in_words(results, point, ends_of_point(results, point))
+    facts.append(Fact("a better one may lie beyond", ends))
     if varied_values(results):
-        what = "setting"
-    hardly = hardly_served_clause(results, best["policy"], [best["point"]])
-    parts = [
-        f"The best {what} is {name}: {measure.within} {value}, n = {best['n']:,}{hardly}.",
-        _others_in_words(results, table.iloc[1:], what),
-        ends_sentence(results, best["point"], ends_of_point(results, best["point"])).strip(),
-        way_home_sentence_of(results, best, metric),
-        unequal_lengths_sentence(results, [measure]),
-    ]
-    return " ".join(filter(None, parts))
+        words = points_in_words(results)
+        others = table[table["policy"] != policy].drop_duplicates("policy")
+        for _, other in others.iterrows():
+            found = f"{words[other['point']]}; {measure.within} {_estimate(other, measure)}"
+            facts.append(Fact(f"with {other['policy']}", found))
+    facts.append(unequal_lengths(results, [measure]))
+    return known_facts(facts)
 
 
-def _others_in_words(results: Results, others: pd.DataFrame, what: str) -> str:
-    """How all settings but the best compare with it, in a sentence; empty if there are none.
+def _estimate(row: pd.Series, metric: Metric) -> str:
+    """The mean of a metric in a row of ``rank_settings`` with its interval, as text."""
+    return metric.written(*row[[metric.column, f"{metric.column}_low", f"{metric.column}_high"]])
+
+
+def _comparison_facts(results: Results, others: pd.DataFrame) -> list[Fact]:
+    """How many of the other settings may be as good as the best one, and which if few may.
 
     Args:
         results: The study.
         others: The rows of ``rank_settings`` but the first.
-        what: What each is called: a setting, or a policy.
     """
     tied = others[others["tied"]]
     worse = "significantly worse"
     if any(results.choice(policy) for policy in results.policies):
-        worse = "ruled out by the selection"
-        if len(results.policies) > 1:
-            worse += " or significantly worse"
-    as_good = "may be as good"
-    if 0 < len(tied) <= MOST_NAMES and len(others) > 1:
-        names = [setting_in_words(results, row.policy, row.point) for row in tied.itertuples()]
-        as_good += f" ({'; '.join(names)})"
-    seen = int((others["standing"] == SEEN_WORSE).sum())
-    verb = "are"
-    if len(others) == 1:
-        verb = "is"
-    verb_of_seen = "are"
-    if seen == 1:
-        verb_of_seen = "is"
+        worse = "ruled out or significantly worse"
+    names = ""
+    if len(tied) <= MOST_NAMES:
+        names = "; ".join(setting_in_words(results, r.policy, r.point) for r in tied.itertuples())
     counts = {
-        as_good: len(tied),
-        f"{verb_of_seen} worse in what was seen, where {NOT_RULED_OUT}": seen,
-        f"{verb} {worse}": int((others["standing"] == WORSE).sum()),
+        "may be as good": len(tied),
+        f"worse in what was seen, where {NOT_RULED_OUT}": (others["standing"] == SEEN_WORSE).sum(),
+        worse: (others["standing"] == WORSE).sum(),
     }
-    non_empty = {words: count for words, count in counts.items() if count}
-    if not non_empty:
-        return ""
-    if len(others) == 1:
-        return f"The other {what} {next(iter(non_empty))}."
-    if len(non_empty) == 1:
-        return f"All {len(others):,} others {next(iter(non_empty))}."
-    *first, last = [f"{count:,} {words}" for words, count in non_empty.items()]
-    if counts[f"{verb} {worse}"]:
-        last = f"the rest are {worse}"
-    return f"Of the {len(others):,} others, {'; '.join([*first, last])}."
+    facts = {label: f"{count:,} of {len(others):,} others" for label, count in counts.items()}
+    if names:
+        facts["may be as good"] += f": {names}"
+    return [Fact(label, found) for label, found in facts.items() if counts[label]]
 
 
-def unequal_lengths_sentence(results: Results, metrics: Iterable[Metric]) -> str:
+def unequal_lengths(results: Results, metrics: Iterable[Metric]) -> Fact:
     """That missions of different lengths are compared by what depends on it; empty if not so.
-
-    Ages grow while a mission lasts, and hours are paid for. A cost is only to be among the metrics
-    where it depends on them.
 
     Args:
         results: The study.
-        metrics: The metrics that are compared.
+        metrics: The metrics by which settings are compared.
     """
     compared = [metric.within for metric in metrics if metric.grows]
+    label = f"length of missions, compared by {numbers.join_words(compared)}"
     missions = results.missions
     has_quota = any(space.quota for space in results.store.manifest.scenarios)
     if not compared or not has_quota or missions["slots"].nunique() == 1:
-        return ""
+        return Fact(label, "")
     means = missions.groupby(["policy", "point"])["slots"].mean()
     units = results.scenario().units
     lengths = [format_length(round(slots), units) for slots in (means.min(), means.max())]
-    return (
-        f"Missions end with their last UAV, after {' to '.join(dict.fromkeys(lengths))} on "
-        f"average, so settings are compared by {numbers.join_words(compared)} over missions of "
-        "different lengths; with quota = 0, all missions last until max_slots."
-    )
-
-
-def other_policies_sentences(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]:
-    """A sentence for each policy but the best: which setting it would have found, and its mean.
-
-    Args:
-        results: The study.
-        ranked: The result of ``rank_settings`` for the metric.
-        metric: The metric.
-    """
-    words = points_in_words(results)
-    best = ranked.iloc[0]
-    others = ranked[ranked["policy"] != best["policy"]].drop_duplicates("policy")
-    ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
-    named = zip(others["policy"], others["point"], ends, strict=True)
-    return [
-        f"With the policy {policy}, it would be {words[point]}: {metric_of(metric).within} "
-        f"{metric_of(metric).written(*of_metric)}."
-        for policy, point, of_metric in named
-        if len(words) > 1
-    ]
+    return Fact(label, f"{' to '.join(dict.fromkeys(lengths))} on average")
 
 
 @compute_once

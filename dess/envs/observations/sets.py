@@ -10,7 +10,7 @@ of the four moves changes.
 """
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from dess.base.kernels import inlined, kernel
 from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates
 from dess.model.channel import World, efficiency
-from dess.model.state import HOVER, STEP_X, STEP_Y
+from dess.model.state import HOVER, STEP_X, STEP_Y, mission_part
 from dess.physics.chart import Chart, is_open, spread
 
 OWN, NODE, MATE, ZONE, ACTION = 30, 24, 17, 11, 14
@@ -36,8 +36,8 @@ _FARTHEST = 255  # [cells]; all longer ways count as this one
 _PROBES = (1.0, 3.0, 8.0)
 
 
-# The fields of ``MISSION`` that ``sea_of`` reads and that a batch need not share.
-_FIELDS = (
+# What ``sea_of`` reads of a mission.
+SEA_PART = mission_part(
     *("zone_pads", "initial_low", "initial_high", "arrival_rate", "charge_rate"),
     *("charge_slots", "communication_slot_length"),
     *("max_rate", "steps", "step_snr", "step_rate"),
@@ -66,14 +66,15 @@ class Sea(NamedTuple):
     constants: np.ndarray
 
 
-def sea_of(mission: Any, world: World) -> Sea:
+def sea_of(mission: np.void, world: World) -> Sea:
     """The sea of a mission.
 
     Args:
-        mission: ``MISSION`` record; only constants of the scenario are read.
+        mission: ``MISSION`` record, or the ``SEA_PART`` of one; missions of a world with equal
+            parts share a sea.
         world: Its nodes and tables.
     """
-    length = float(mission["communication_slot_length"] * mission["communication_slots"])
+    length = float(mission["communication_slot_length"] * world.means.shape[2])
     snr = world.mean_snr[0, :: (world.mean_snr.shape[1] - 1) // (len(world.mean_snr) - 1)]
     low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
     unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
@@ -84,7 +85,7 @@ def sea_of(mission: Any, world: World) -> Sea:
     return Sea(
         world.chart,
         world.nodes.copy(),
-        mission["zone_pads"][: mission["zones"]].copy(),
+        mission["zone_pads"][: len(world.chart.sizes)].copy(),
         np.float32(unit),
         rates.astype(np.float32),
         np.array([*log10(probes + 1e-3), *others], np.float32),
@@ -98,24 +99,6 @@ def _efficiencies_at(mission, snr):
     for number in range(len(snr)):
         efficiencies[number] = efficiency(mission, snr[number])
     return efficiencies
-
-
-def sea_constants(mission: Any) -> bytes:
-    """What ``sea_of`` reads of a mission."""
-    return b"".join(mission[name].tobytes() for name in _FIELDS)
-
-
-def sea_kinds(missions: np.ndarray) -> np.ndarray:
-    """(B,) numbers that are equal for missions of a batch on the same sea."""
-    kinds = np.zeros(len(missions), np.int64)
-    for name in _FIELDS:
-        field = missions[name].reshape(len(missions), -1)
-        if (field == field[0]).all():  # the usual case, and quick
-            continue
-        for values in field.T[(field != field[0]).any(axis=0)]:
-            numbers = np.unique(values, return_inverse=True)[1]
-            kinds = np.unique(kinds * len(missions) + numbers, return_inverse=True)[1]
-    return kinds
 
 
 class _Tables(NamedTuple):

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import sweep
+from dess.analysis import numbers, sweep
 from dess.analysis.answers import variation as found
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.variation import BASELINE, VARIATION
@@ -24,7 +24,7 @@ from dess.analysis.stats.verdict import (
     SEEN_BELOW,
     judge_difference,
 )
-from tests.analysis.small import asked, write_scenario
+from tests.analysis.small import asked, found_of, write_scenario
 
 POLICIES = ["random", "greedy"]
 
@@ -51,11 +51,12 @@ def test_settings_are_ranked(asking):
     best = answer.best()
     assert [*best["policy"]] == [*table["policy"].unique()]
     assert best["rank"].iloc[0] == 1
-    best, other = answer.answers()
-    assert best.startswith(f"The best setting is {table['policy'][0]} with ")
+    assert answer.headline().startswith(f"The best is {table['policy'][0]} with ")
+    assert numbers.format_percent(table[PRODUCT][0]) in answer.headline()
     found = table[table["policy"] != table["policy"][0]].iloc[0]
-    assert other.startswith(f"With the policy {found['policy']}, it would be {found['uavs']} UAV")
-    assert answer.guarantee == ""
+    other = found_of(answer.facts())[f"with {found['policy']}"]
+    assert other.startswith(f"{found['uavs']} UAV")
+    assert numbers.format_percent(found[PRODUCT]) in other
 
 
 def test_the_cheapest_settings_are_the_best(asking):
@@ -80,6 +81,12 @@ MISSIONS = 12
 @pytest.fixture(scope="module")
 def answer(tmp_path_factory):
     return asked(tmp_path_factory.mktemp("what-if"))
+
+
+def row_of(before, difference, low, high):
+    """A row of ``compare_sides`` on the product of greedy."""
+    about = {"policy": "greedy", "metric": PRODUCT, "before": before, "after": before + difference}
+    return pd.Series({**row(difference, low, high, p=0.2), **about, "n": 100})
 
 
 def row(difference, low, high, p=0.01, n=100, p_student=1.0):
@@ -134,15 +141,16 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     assert line.tolist() == ["–", f"{mean:.2f}", ""]
 
 
-def test_the_first_sentence_says_in_how_many_missions_uavs_can_fly_home(answer, tmp_path):
+def test_an_answer_says_in_how_many_missions_uavs_can_fly_home(answer, tmp_path):
     missions = answer.results.missions
-    said = answer.variation.sentence()
+    found = found_of(answer.facts())
     for policy in POLICIES:
         of_policy = missions[missions["policy"] == policy].groupby("point")["home"].mean()
         before, after = (f"{100 * share:.1f} %" for share in of_policy)
-        assert f"with {policy} in {before} of the missions before and in {after} after" in said
+        said = found[f"battery for the way home with {policy}"]
+        assert said == f"{before} before, {after} after"
     landing = asked(tmp_path, 4, baseline={"uavs": 2, "landing": True})
-    assert "way home" not in landing.variation.sentence()
+    assert "way home" not in str(landing.facts())
 
 
 def test_missions_without_a_quota_have_no_allowance_for_being_shorter(tmp_path):
@@ -224,10 +232,12 @@ def test_a_gain_in_most_missions_is_better_in_what_was_seen(answer):
     assert {*verdicts.values()} == {SEEN_ABOVE}
     assert judge_difference(table.loc["residual"]) == SEEN_BELOW
     variation = found.Variation(made, like["policy"])
-    assert "(higher in what was seen; a rare failure is not ruled out)" in variation.sentence()
-    (said,) = [found.conclusion_in_words(row) for row in variation._of_product()]
-    assert "product is **higher in what was seen** (a rare failure is not ruled out), by +0" in said
-    assert "show it with a probability of 80 %" in said
+    policy = like["policy"]
+    said = found_of(variation.facts())
+    assert said[f"product with {policy}"].startswith("+0")
+    assert "higher in what was seen" in said[f"product with {policy}"]
+    assert said[f"300 pairs with {policy}"] == "better in 78.0 %, worse in 22.0 %"
+    assert f"missions to show it with {policy}" in said
     ratio = variation.measures(like["policy"]).set_index("Mean per mission")
     assert ratio.loc["Collection ratio", "Paired difference"].startswith("△ ")
 
@@ -254,33 +264,16 @@ def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_l
     assert (even.variation.typical().replication, even.variation.worst().replication) == (2, 1)
 
 
-def test_what_contradicts_the_mean_is_said_only_where_it_occurs(answer):
-    """Better in most missions and worse on average, because of failed missions."""
-
-    def contrasts(before, after):
-        made = with_missions(answer, before, after, [0.5] * 4)
-        missions = made.results.missions
-        missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
-        return replace(made, results=replace(made.results, missions=missions)).variation.contrasts()
-
-    said = contrasts([0.5, 0.5, 0.5, 0.5], [0.6, 0.6, 0.6, 0.0])
-    assert said.startswith("With greedy, the product is higher in more missions than it is lower, ")
-    assert said.endswith("lower on average: a failed mission counts 0, and 1 fail in place of 0.")
-    assert contrasts([0.5] * 4, [0.6] * 4) == ""
-    assert contrasts([0.5, 0.5, 0.5, 0.5], [0.6, 0.6, 0.6, 0.1]).endswith("lower on average.")
-
-
-def test_what_is_explained_occurs(answer, monkeypatch):
-    """Intervals that overlap, marks that are used, and learned policies."""
-    assert "learned policy" not in answer.variation.reading()
-    monkeypatch.setattr(found, "judge_difference", lambda _: ABOVE)
-    assert "≈" not in answer.variation.reading()
-    monkeypatch.setattr(found, "judge_difference", lambda _: INCONCLUSIVE)
-    assert "≈" in answer.variation.reading() and "overlap" not in answer.variation.reading()
-    assert "△" not in answer.variation.reading()
-    monkeypatch.setattr(found, "judge_difference", lambda _: SEEN_BELOW)
-    assert "lower (▽) in what was seen" in answer.variation.reading()
-    assert "overlap" not in answer.variation.reading()
+def test_what_contradicts_the_mean_is_told_by_pairs_and_failures(answer):
+    """Better in most missions and worse on average, because of a failed mission."""
+    made = with_missions(answer, [0.5] * 4, [0.6, 0.6, 0.6, 0.0], [0.5] * 4)
+    missions = made.results.missions
+    missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
+    variation = replace(made, results=replace(made.results, missions=missions)).variation
+    row = row_of(0.5, -0.1, -0.3, 0.1)
+    said = found_of(variation._product_facts(row))
+    assert said["100 pairs with greedy"] == "better in 75.0 %, worse in 25.0 %"
+    assert said["failed missions with greedy"] == "0 before, 1 after"
 
 
 def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):
@@ -297,20 +290,30 @@ def test_the_best_policy_of_each_side_is_found(answer):
         best = side.loc[side["mean"].idxmax(), "policy"]
         assert found.best_policy_of_side(answer.results, point) == best
     assert answer.variation.shown == best
-    assert answer._repr_markdown_() == answer.variation.answer()  # what Jupyter shows
-    assert [line.split(":")[0] for line in answer.answers()[1:]] == POLICIES
+    assert answer.headline() in answer._repr_markdown_()  # what Jupyter shows
+    assert {f"product with {policy}" for policy in POLICIES} <= {*found_of(answer.facts())}
 
 
 @pytest.mark.parametrize(
     ("ends", "said"),
     [
-        ((0.05, 0.04, 0.06), "is **higher** in the variation, by +5.0 [+4.0, +6.0] points"),
-        ((-0.05, -0.06, -0.04), "is **lower** in the variation, by −5.0 [−6.0, −4.0] points"),
-        ((0.01, -0.01, 0.03), "820 missions (instead of 100) show it with a probability of 80 %"),
+        ((0.05, 0.04, 0.06), "+5.0 [+4.0, +6.0] points, higher; 90.0 % before, 95.0 % after"),
+        ((-0.05, -0.06, -0.04), "−5.0 [−6.0, −4.0] points, lower; 90.0 % before, 85.0 % after"),
+        (
+            (0.01, -0.01, 0.03),
+            "+1.0 [−1.0, +3.0] points, inconclusive; 90.0 % before, 91.0 % after",
+        ),
     ],
 )
-def test_a_conclusion_names_the_side_of_the_whole_interval_or_how_many_missions_it_takes(
-    ends, said
-):
-    about = {"policy": "greedy", "metric": PRODUCT, "before": 0.9, "after": 0.9 + ends[0]}
-    assert said in found.conclusion_in_words(pd.Series({**row(*ends, p=0.2), "n": 100, **about}))
+def test_a_difference_is_told_with_its_verdict_or_how_many_missions_it_takes(answer, ends, said):
+    facts = found_of(answer.variation._product_facts(row_of(0.9, *ends)))
+    assert facts["product with greedy"] == said
+    needed = facts.get("missions to show it with greedy")
+    assert needed == (None if ends[1] * ends[2] > 0 else "about 820 for a probability of 80 %")
+
+
+def test_a_headline_has_at_most_25_words(answer, tmp_path):
+    many = asked(tmp_path, 2, settings={"uavs": 3, "pads": 1, "quota": 30, "grid": 9})
+    for each in (answer, many):
+        assert len(each.headline().split()) <= 25
+    assert many.headline().startswith("4 changed fields: product with ")

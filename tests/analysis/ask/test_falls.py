@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis import load_results
+from dess.analysis import load_results, numbers
 from dess.analysis.ask import around, falls
-from dess.analysis.ask.brief import brief_sentences
 from dess.analysis.ask.question import sweep_question
 from dess.analysis.flights.phases import (
     CHARGES,
@@ -24,7 +23,7 @@ from dess.model.events import EventLog
 from dess.reports.pages.study import make_study_report
 from dess.scenario.quantities import printed
 from tests.analysis.flights.hand import scenario_of, write_sea
-from tests.analysis.small import SHEET, write_scenario
+from tests.analysis.small import SHEET, found_of, write_scenario
 from tests.reports.small import said_by
 
 # A sea with a single pad, short flights, and more data than two UAVs can collect.
@@ -97,10 +96,12 @@ def test_an_answer_says_why_one_more_uav_collects_less(searched):
     # The third one does not collect what it costs the others.
     before = fall.shares_before[SERVES].mean()
     assert fall.shares[SERVES].mean() < before
-    text = fall.sentence()
-    assert text.startswith("With 3 UAVs instead of 2 UAVs, the collection ratio is lower")
-    assert f"{SERVES} for {fall.shares[SERVES].mean():.1%} of its time".replace("%", " %") in text
-    assert f" instead of {before:.1%}".replace("%", " %") in text
+    found = found_of(fall.facts())
+    where = "3 UAVs instead of 2 UAVs"
+    assert found[f"{where}, with greedy"].startswith("collection ratio −")
+    share = numbers.format_percent(fall.shares[SERVES].mean())
+    share_before = numbers.format_percent(before)
+    assert f"{SERVES} {share}, not {share_before}" in found[f"{where}: time of a UAV"]
     missions = changed_results.missions
     before, now = (
         np.mean([*missions.loc[missions["point"] == point, "node_ratios"]], axis=0)
@@ -108,12 +109,10 @@ def test_an_answer_says_why_one_more_uav_collects_less(searched):
     )
     node = np.argmin(now - before)
     x, y = BUSY["nodes"][node]
-    named = f"The node that loses most is [{x}, {y}], from {before[node]:.1%} to {now[node]:.1%}"
-    assert f"{named.replace('%', ' %')} of its data ({100 * (now - before)[node]:+.1f}".replace(
-        "-", "−"
-    ) in text.replace("-", "−")
-    assert "due to the policy greedy and its return guard, not to the fleet" in text
-    assert text in brief_sentences(searched)
+    share, share_before = (numbers.format_percent(each[node]) for each in (now, before))
+    change = numbers.format_difference(now[node], before[node])
+    text = f"[{x}, {y}], {share} of its data, not {share_before} ({change} ["
+    assert found[f"{where}: node that loses most"].startswith(text)
     (drawing,) = falls.draw_falls(searched)
     assert DRAWN in drawing.caption
     bars = drawing.figure.axes[0].patches
@@ -128,20 +127,20 @@ def test_a_fall_says_when_the_last_data_are_collected(searched):
     served = pd.DataFrame(log).query("event == 'communication'")
     assert last[0] == served["time"].max()
     same = replace(fall, shares=fall.shares_before, last_data=last)
-    assert "last data" not in same.sentence()
+    label = f"{same.fleet} instead of {same.before}: last data"
+    assert label not in found_of(same.facts())
     earlier = replace(same, last_data=last - 20 - np.arange(len(last)))
-    text = earlier.sentence()
-    assert "the shares of time of the UAVs do not differ significantly" in text
+    found = found_of(earlier.facts())
+    assert not [each for each in found if each.endswith("time of a UAV")]
     slot = fall.units.slot
     means = [printed(slots.mean() * slot, "s") for slots in (earlier.last_data, last)]
-    said = f"The last data of a mission are collected after {means[0]} instead of {means[1]}. "
-    assert said in text
+    assert found[label] == f"after {means[0]}, not {means[1]}"
 
 
 def test_a_node_is_named_only_if_the_missions_show_that_it_loses(searched):
     fall = falls.find_falls(searched)[0]
     noise = np.random.default_rng(5).normal(0, 0.1, fall.nodes.shape)
-    assert "loses most" not in replace(fall, nodes=fall.nodes_before + noise).sentence()
+    assert "loses most" not in str(replace(fall, nodes=fall.nodes_before + noise).facts())
 
 
 @pytest.mark.slow
@@ -149,7 +148,7 @@ def test_a_node_is_named_only_if_the_missions_show_that_it_loses(searched):
 def test_the_page_says_and_draws_why_one_more_uav_collects_less(searched):
     folder = str(searched.store.folder)
     said = said_by(make_study_report(load_results(folder)), results=folder)
-    for text in (DRAWN, *falls.fall_sentences(searched)):
+    for text in (DRAWN, *found_of(falls.fall_facts(searched)).values()):
         assert text in said
 
 
@@ -164,5 +163,5 @@ def test_nothing_is_said_where_no_neighbour_collects_less(searched, monkeypatch)
     better = replace(changed_results, missions=missions)
     monkeypatch.setattr(around, "load_around", lambda _: better)
     again = load_results(searched.store.folder)
-    assert falls.fall_sentences(again) == []
+    assert falls.fall_facts(again) == []
     assert falls.draw_falls(again) == []

@@ -78,8 +78,8 @@ def test_a_lost_uav_costs_what_it_was_bought_for_where_missions_are_paid_for():
     assert losses(charge=1) == losses(hour=1, slot_seconds=60) == 300
     assert losses(years=5, days=200, lost_uav=0) == 0
     assert losses(years=5, days=200, lost_uav=50) == 200 * 50
-    assert "A lost UAV costs what it was bought for." in Costs(uav=1, years=5, days=9).in_words
-    assert "a lost UAV" in Costs(uav=1).in_words
+    assert Costs(years=5, days=9).amounts_on(spaces)["a lost UAV"] == "what it was bought for"
+    assert Costs(uav=1).amounts_on(spaces)["a lost UAV"] == ""
 
 
 def test_the_price_of_a_type_replaces_that_of_a_uav():
@@ -91,10 +91,10 @@ def test_the_price_of_a_type_replaces_that_of_a_uav():
     parts = prices.parts(spaces, missions, {"down": [0] * 7})
     pads = 10 * spaces[0].charging_pads
     assert parts["purchase"].tolist() == [(700 + pads) / 2, (300 + pads) / 2, (300 + 10) / 2]
-    assert prices.words_on(spaces).startswith("Prices: 300 EUR for a UAV of type 1, 100 EUR for a")
-    free = Costs(pad=10).words_on([space(uavs=1, fleet=[{"price": 300.0}])])
-    assert free.startswith("Prices: 300 EUR for a UAV of type 1 and 10.00 EUR for a charging pad.")
-    assert " for a UAV," not in free
+    amounts = prices.amounts_on(spaces)
+    assert amounts["a UAV of type 1"] == "300 EUR" and amounts["a UAV"] == "100 EUR"
+    of_types = Costs(pad=10).amounts_on([space(uavs=1, fleet=[{"price": 300.0}])])
+    assert of_types["a charging pad"] == "10.00 EUR" and "a UAV" not in of_types
 
 
 def test_the_battery_that_a_small_type_has_spent_counts_from_its_own():

@@ -102,7 +102,10 @@ def _cells_of_teammates(sea: Sea) -> list[tuple[int, int] | None]:
 def _decides_alike(plain: Sea, turned: Sea, turn: Turn) -> bool:
     """Whether all UAVs charge at the same cells of a turned sea: no tie was decided otherwise.
 
-    Nor may a tie have been decided otherwise in the plan that a UAV has of its teammates.
+    Nor may a tie have been decided otherwise in the plan that a UAV has of its teammates, whose
+    cells it does not take. For example, a UAV stands at (6, 4) in a zone from (4, 3) to (6, 4), and
+    a teammate comes from (7, 6): of the cells that are left to it, (6, 3) and (5, 4) are both 4
+    cells away, and the plan has the first one, row by row. In a mirrored sea it is the other one.
 
     Where no UAV has to wait for a pad, the one with the lowest battery chooses first, so its way is
     the same whatever it chooses. Otherwise the one that can ask soonest does.

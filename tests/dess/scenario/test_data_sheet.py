@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from dess import InputError, load_scenario, policies, simulate
 from dess.model.channel import world_of
 from dess.model.state import constants_of
+from dess.scenario.data_sheet import lora
 from dess.scenario.quantities import printed
 from dess.scenario.rotary_wing import airspeed_along, largest_speed
 from dess.scenario.scenario import ScenarioSpace
@@ -134,9 +135,8 @@ def test_packets_of_lora_take_the_time_on_air_of_the_chip():
         assert 1000 * bits / slowest == pytest.approx(factor_12, abs=0.01)
         assert 1000 * bits / fastest == pytest.approx(factor_7, abs=0.01)
     # 222 bytes and a header of 13 take 368.9 ms with factor 7; 51 and 13 take 2,793.47 with 12.
-    sheet = _space({"modulation": "lora"}).data_sheet
-    assert sheet.lorawan_overhead(7) == pytest.approx(5468.75 * 0.368896 / (8 * 222))
-    assert sheet.lorawan_overhead(12) == pytest.approx(244.140625 * 2.793472 / (8 * 51))
+    assert lora.lorawan_overhead(7, 125e3) == pytest.approx(5468.75 * 0.368896 / (8 * 222))
+    assert lora.lorawan_overhead(12, 125e3) == pytest.approx(244.140625 * 2.793472 / (8 * 51))
 
 
 def test_a_node_is_served_at_the_highest_step_that_its_snr_reaches():

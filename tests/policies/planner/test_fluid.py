@@ -16,7 +16,7 @@ from dess.policies.planner.fluid import (
     insert_waypoint,
     simulate_flight,
 )
-from dess.policies.planner.rates import load_rates
+from dess.policies.planner.rates import RATES_PART, Rates, load_rates
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve_plan
 from tests.dess.model.flights import first_view
 
@@ -50,10 +50,15 @@ class _Follow:
         return np.array([self.crafts[slot + 1]["action"][i] for i in view.uav])
 
 
+def _rates(view: View) -> Rates:
+    part, _ = next(view.rows_by(RATES_PART))
+    return load_rates(view.world, part)
+
+
 def _flown(view: View, plan: Plan, slots: int) -> tuple[list[np.ndarray], float, float]:
     """The UAVs at the start of each slot of a flight, its value, and the data it collects."""
     (mission,), uavs, residual = view.state.missions, view.state.uavs[0], view.state.residual[0]
-    flight, rates = empty_flight(MOST_SLOTS, len(uavs), len(residual)), load_rates(view)
+    flight, rates = empty_flight(MOST_SLOTS, len(uavs), len(residual)), _rates(view)
     begin_flight(mission, uavs, residual, flight)
     crafts, value = [flight.team[0].copy()], 0.0
     for slot in range(1, slots + 1):
@@ -66,7 +71,7 @@ def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
     state = view.state
     (mission,), uavs, residual = state.missions, state.uavs[0], state.residual[0]
     workspace = empty_workspace(int(mission["max_slots"]), len(uavs), len(residual))
-    nodes, rates = view.world.nodes, load_rates(view)
+    nodes, rates = view.world.nodes, _rates(view)
     arguments = mission, uavs, residual, nodes, rates, plan, workspace, steps, 1.0
     improve_plan(*arguments, most)
     while workspace.course[TRIED]:

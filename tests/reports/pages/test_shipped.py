@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import textwrap
 from base64 import b64decode
 from typing import Any
 
@@ -18,7 +17,6 @@ from dess.analysis.results.tables import Results
 from dess.reports.pages.notebook import NAMES, read_report
 from dess.reports.pages.page import STUDY, Page
 from dess.reports.pages.render import render
-from tests.pins.pinned import pinned
 from tests.reports.pages.test_render import another_environment
 from tests.reports.small import EMBEDDED, Links, run_small_studies, said_by, words, words_of
 
@@ -91,12 +89,9 @@ def test_pages_load_nothing(pages, files):
 
 @pytest.mark.brief
 @pytest.mark.parametrize("name", NAMES)
-def test_a_page_says_what_the_kept_one_says(pages, name):
-    html = pages[f"{name}.html"]
-    lead = words(" ".join(re.findall('<p class="lead"[^>]*>(.*?)</p>', html, re.S)))
-    text = words_of(html).partition("How this page was made")[0]
-    parts = (textwrap.fill(part, 100, break_long_words=False) for part in (lead, text))
-    pinned(f"pages/{name}.txt", "\n\n".join(parts) + "\n")
+def test_every_page_answers_with_a_number(pages, name):
+    (lead,) = re.findall('<p class="lead"[^>]*>(.*?)</p>', pages[f"{name}.html"], re.S)
+    assert re.search(r"\d", words(lead))
 
 
 @pytest.mark.brief

@@ -1,4 +1,4 @@
-"""The answer of a search for the cheapest fleet: its table, sentences and guarantee."""
+"""The answer of a search for the cheapest fleet: its table, facts and guarantee."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.fleet.costs import mean_cost_parts, priced_settings
+from dess.analysis.answers.fleet.costs import mean_cost_parts, price_facts, priced_settings
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.metrics import COST, RATIO, metric_of
 from dess.analysis.stats.differences import compare_pairs
@@ -19,7 +19,7 @@ from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.study import CHECK
 from tests.analysis.answers.fleet.test_costs import DESIGN, PRICES
-from tests.analysis.small import small_study
+from tests.analysis.small import found_of, small_study
 
 RULE = {
     "procedure": "cheapest",
@@ -58,11 +58,8 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert manifest.selected[0]  # or this test says little
     assert len(verdicts.checked_settings(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
-    texts = "\n".join(search_of(searched).sentences())
-    assert "With the policy `greedy` and under all conditions, the cheapest fleet" in texts
-    assert "shown at" not in texts
     saving = "costs at most 50.00 EUR more than any"
-    assert all(saving in guarantee for guarantee in search_of(searched).guarantee_sentences())
+    assert all(saving in guarantee for guarantee in search_of(searched).guarantees())
 
 
 def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
@@ -71,7 +68,8 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
     assert quoted.loc[checks.index, checks.columns].equals(checks)
     assert quoted.loc[others].equals(found.loc[others])
     assert "intervals that allow for the search" in fleet_tables.fleet_table(searched).caption
-    assert "In 6 missions that check it" in " ".join(search_of(searched).sentences())
+    measured = found_of(search_of(searched).facts())["measured in"]
+    assert measured == "6 missions that check it, under the worst condition for each metric"
     for (policy, point), row in found.iterrows():
         missions = searched.missions.query("policy == @policy and point == @point")
         level = float(level_after(searched.looks(policy)[point]))
@@ -132,13 +130,15 @@ def test_the_price_is_told_in_its_parts(searched):
     best, table = search_of(searched).best, mean_cost_parts(searched)
     rows = table[(table["policy"] == best.policy) & table["point"].isin(best.points)]
     purchase, hours = rows["purchase"].mean(), rows["hours"].mean()
-    text = search_of(searched).sentence()
-    assert f": {purchase:,.0f} EUR for the purchase and " in text
-    assert f"hours {numbers.format_money(hours, 'EUR')}" in text
+    found = found_of([*search_of(searched).facts(), *price_facts(searched)])
+    assert found["of it for the purchase"] == f"{purchase:,.0f} EUR"
+    assert f"hours {numbers.format_money(hours, 'EUR')}" in found["of it for 5 missions"]
     assert best.cost == pytest.approx(rows["cost"].mean())
-    prices = searched.prices.in_words
-    assert "1,000 EUR for a UAV, 100 EUR for a charging pad" in prices
-    assert "The fleet is to make 5 missions." in prices
+    assert found["prices"].startswith("a UAV 1,000 EUR, a charging pad 100 EUR")
+    assert found["paid for"] == "the purchase and 5 missions"
+    assert search_of(searched).headline() == (
+        f"Buy {best.fleet}: {numbers.format_money(best.cost, 'EUR')} with 5 missions."
+    )
 
 
 def test_what_is_shown_of_missions_is_of_the_answer(searched):
@@ -154,13 +154,12 @@ def test_an_answer_says_whether_uavs_can_fly_home(searched):
         searched.checks[searched.checks["policy"] == best.policy].groupby("point")["home"].mean()
     )
     worst = means[[*best.points]].min()
-    assert f"At the end of {numbers.format_percent(worst)} [" in search_of(searched).sentence()
+    found = found_of(search_of(searched).facts())
+    assert found["battery for the way home"].startswith(f"{numbers.format_percent(worst)} [")
     parts = mean_cost_parts(searched)
     rows = parts[(parts["policy"] == best.policy) & parts["point"].isin(best.points)]
     number = numbers.format_quantity(round(rows["stranded"].mean(), 2))
-    assert (
-        f"On average {number} UAVs of a mission are left without" in search_of(searched).sentence()
-    )
+    assert found["UAVs without it, which have no price"] == f"{number} of a mission"
 
 
 # A sea with a second zone, whose pads are paid for.
@@ -181,17 +180,23 @@ def test_an_answer_says_what_is_guaranteed_names_all_that_is_paid_and_its_ends(t
     values = {"uavs": [2, 3], "pads": [1, 2], "zones.pads": [1, 3]}
     asked = {"success": 0.6, "collection_ratio": 0.11}
     found = searched_sea(tmp_path, ["random", "greedy"], asked, values)
-    text = search_of(found).sentence()
+    search = search_of(found)
+    fleet = "2 UAVs, 1 pad in zone 1 and 1 pad in zone 2"
+    assert search.headline() == f"Buy {fleet}: 2,200 EUR."
+    facts = {fact.label: fact for fact in search.facts()}
     # Of two policies with the same fleet, the answer is the one that collects more.
-    assert text.startswith("With the policy `greedy`, the cheapest fleet")
-    assert "With the policy `random`, it is the same fleet, with collection ratio " in text
-    assert "**2 UAVs, 1 pad in zone 1 and 1 pad in zone 2** for 2,200 EUR" in text
+    assert facts["policy"].found == "greedy"
+    assert facts["with random"].found.startswith(f"{fleet}, 2,200 EUR; ")
+    (random,) = (answer for answer in search.fleet_answers if answer is not search.best)
+    assert random.measured(random.tightest_first[0].column) in facts["with random"].found
+    success = facts["success"]
+    assert (success.required, success.guaranteed) == ("at least 60 %", "at least 50 %")
     # Of two policies.
-    first, other = search_of(found).reason_sentences()
-    assert "With a probability of at least 95 %, its success is at least 50 % and " in first
-    assert "With a probability of at least 97.5 %, its success is at least 50 % and " in other
-    ends = "2 UAVs is the least and pads of each further zone 1 is the least"
-    assert f"Of the values asked for, {ends}; a cheaper one may lie beyond." in first
+    assert facts["probability of what is guaranteed"].found == "at least 95 %"
+    (other,) = (answer for answer in search.fleet_answers if answer is not search.best)
+    assert found_of(other.facts())["probability of what is guaranteed"] == "at least 97.5 %"
+    ends = "2 UAVs (least), pads of each further zone 1 (least)"
+    assert facts["a cheaper one may lie beyond"].found == ends
     assert {*priced_settings(found)["cost"]} == {
         1000 * u + 100 * p for u in (2, 3) for p in (2, 3, 4, 5)
     }
@@ -222,17 +227,14 @@ def test_the_answer_is_the_cheapest_fleet_of_any_policy(first, tmp_path):
     one, three = (f"{uavs}, 1 pad in zone 1 and 1 pad in zone 2" for uavs in ("1 UAV", "3 UAVs"))
     # Or this test says little.
     assert fleets == {"greedy": one, "nearest": three}
-    text = search.sentence()
-    assert text.startswith("With the policy `greedy`, the cheapest fleet")
-    other = f"With the policy `nearest`, it would be **{three}** for 3,200 EUR."
-    assert text.endswith(other)
+    told = {fact.label: fact for fact in search.facts()}
+    assert told["policy"].found == "greedy"
+    assert told["with nearest"].found.startswith(f"{three}, 3,200 EUR; ")
     # Success was not required, and is told.
-    assert "its success is " in text
-    assert "(none is required)" in text
-    assert search.sentences()[0] == text
+    assert told["success"].found and not told["success"].required
     assert search.best.fleet == one
     # One UAV is the least of all.
-    assert "Of the values" not in search.reason_sentences()[0]
+    assert "a cheaper one may lie beyond" not in told
 
 
 def test_the_lead_figure_is_of_the_condition_that_decides(monkeypatch):
@@ -261,10 +263,10 @@ def test_an_answer_says_what_would_have_settled_it(studied, tmp_path):
     values = {"uavs": [[1, 3]], "pads": [1]}
     short = {"tolerance": 0.02, "budget": 40}
     found = searched_sea(tmp_path, ["random"], {"collection_ratio": near}, values, **short)
-    (text,) = search_of(found).reason_sentences()
+    search = search_of(found)
+    assert search.headline() == "No fleet is known to meet the requirements."
     enough = found.cheapest("random").enough
     assert 40 < enough < 40 * 64
-    pair = "**1–3 UAVs, 1 pad in zone 1 and 1 pad in zone 2** with the policy `random`"
-    undecided = f"before it was decided whether {pair} meets the requirements; about "
-    assert f"The budget of 40 missions ended {undecided}" in text
-    assert " missions would settle it." in text
+    undecided = found_of(search.facts())["undecided"]
+    fleet = "1–3 UAVs, 1 pad in zone 1 and 1 pad in zone 2"
+    assert undecided == f"{fleet}; about {float(f'{enough:.2g}'):,.0f} missions would settle it"

@@ -7,6 +7,7 @@ from dess.analysis.answers.fleet import verdicts
 from dess.analysis.answers.fleet.costs import (
     cost_front,
     mean_cost_parts,
+    price_facts,
     priced_settings,
 )
 from dess.analysis.metrics import metric_in_missions
@@ -78,7 +79,7 @@ def test_bad_questions_get_one_line(fixed, studied):
         priced_settings,
         mean_cost_parts,
         cost_front,
-        lambda results: results.prices.in_words,
+        price_facts,
         verdicts.judge_settings,
     ):
         with pytest.raises(InputError, match=r"no prices"):

@@ -5,12 +5,12 @@ import pytest
 
 from dess import InputError
 from dess.analysis.answers.fleet.cheapest import search_of
-from dess.analysis.answers.settings.ranking import best_setting_sentence, rank_settings
+from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.ask.answer import sweep
 from dess.analysis.ask.limits import find_limits, place_of_limits
 from dess.analysis.ask.question import sweep_question
 from dess.analysis.metrics import LEAST, NODE_RATIOS, PRODUCT
-from tests.analysis.small import SHEET, write_scenario
+from tests.analysis.small import SHEET, found_of, write_scenario
 
 PRICES = {"uav": 1000, "pad": 10}
 # Two nodes near the zone, and one in the other corner, where no UAV can serve it and come home.
@@ -24,29 +24,28 @@ def neglecting(tmp_path_factory):
     return write_scenario(folder, **SHEET, **FAR), folder
 
 
-def test_the_first_sentence_names_the_nodes_that_are_hardly_served(neglecting):
+def test_an_answer_names_the_nodes_that_are_hardly_served(neglecting):
     scenario, folder = neglecting
     answer = sweep(scenario, ["greedy"], 12, folder=folder, progress=False, uavs=[1, 2])
     rows = rank_settings(answer.results, PRODUCT)
     missions = answer.results.missions.query(f"point == {rows['point'][0]}")
     ratios = np.mean([*missions[NODE_RATIOS]], axis=0)
     assert (ratios < 0.1).tolist() == [False, False, True]  # or this test says little
-    first = best_setting_sentence(answer.results, rows, PRODUCT)
-    assert "n = 12; it hardly serves [39, 39] (0.0 % of its data)." in first
+    found = found_of(answer.facts())
+    assert found["measured in"] == "12 missions"
+    assert found["hardly served"] == "[39, 39] (0.0 % of its data)"
 
 
 def test_a_fleet_that_meets_the_ratio_may_neglect_a_node_until_it_is_required(neglecting):
     scenario, folder = neglecting
     asked = {"prices": PRICES, "folder": folder, "progress": False, "uavs": [1, 2]}
     found = sweep(scenario, ["greedy"], 20, requirements={"ratio": 0.2}, **asked)
-    first = search_of(found.results).best.choice_sentence()
-    assert "the cheapest fleet that meets the requirements is" in first
-    assert "it hardly serves [39, 39]" in first
+    assert found.headline().startswith("Buy ")
+    assert found_of(found.facts())["hardly served"].startswith("[39, 39]")
     required = sweep(scenario, ["greedy"], 20, requirements={"ratio": 0.2, "least": 0.5}, **asked)
-    search = search_of(required.results)
-    assert search.best.fleet == "none"
-    assert "misses the requirements" in search.best.cheaper_sentence()
-    assert "collection ratio of the worst node 0.0 % [0.0," in search.best.cheaper_sentence()
+    assert search_of(required.results).best.fleet == "none"
+    closest = found_of(required.facts())["closest (missed)"]
+    assert "collection ratio of the worst node 0.0 % [0.0," in closest
 
 
 def test_the_worst_node_and_the_oldest_age_are_requirements_like_others(tmp_path):
@@ -59,10 +58,10 @@ def test_the_worst_node_and_the_oldest_age_are_requirements_like_others(tmp_path
     row = best.estimates(LEAST)
     checks = answer.results.checks.query("point == @best.points[0]")
     assert row[LEAST] == pytest.approx(np.mean([*checks[NODE_RATIOS]], axis=0).min())
-    sentence = best.estimates_sentence()
-    assert "its collection ratio of the worst node is" in sentence
-    assert "(at least 20 % required)" in sentence and "(at most 60 min required)" in sentence
-    assert "hardly" not in best.choice_sentence()
+    facts = {fact.label: fact for fact in answer.facts()}
+    assert facts["collection ratio of the worst node"].required == "at least 20 %"
+    assert "at most 60 min" in [fact.required for fact in facts.values()]
+    assert "hardly served" not in facts
     assert "at least 0.195 and a mean age of the oldest node of" in answer.guarantee
     find_limits(answer.results, str(scenario), missions=10)
     assert place_of_limits(answer.results).exists()

@@ -21,12 +21,16 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
     varied_values,
 )
-from dess.analysis.answers.settings.ranking import best_settings_sentence, rank_settings
+from dess.analysis.answers.settings.ranking import (
+    best_setting_facts,
+    best_setting_headline,
+    rank_settings,
+)
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.stats.alternatives import BEST, SEEN_BEST, TIED, may_be_best
-from dess.analysis.stats.verdict import SEEN_WORSE, WORSE
+from dess.analysis.stats.verdict import NOT_RULED_OUT, SEEN_WORSE, WORSE
 from dess.reports import cli
-from tests.analysis.small import grid
+from tests.analysis.small import found_of, grid
 
 
 @pytest.fixture(scope="module")
@@ -112,19 +116,17 @@ def test_a_setting_of_few_missions_is_not_tied_when_its_interval_is_below(result
 def test_where_all_settings_may_be_as_good_none_is_called_worse(results):
     table = rank_settings(results)
     all_tied = table.assign(tied=True, standing=TIED)
-    said = best_settings_sentence(results, all_tied, PRODUCT)
-    assert "All 11 others may be as good." in said and "worse" not in said
+    found = found_of(best_setting_facts(results, all_tied, PRODUCT))
+    assert found["may be as good"] == "11 of 11 others" and "worse" not in str([*found])
     standing = np.where(table["rank"] <= 3, TIED, WORSE)
     three = table.assign(tied=table["rank"] <= 3, standing=standing)
-    said = best_settings_sentence(results, three, PRODUCT)
-    assert "Of the 11 others, 2 may be as good (" in said
-    assert "the rest are significantly worse." in said
+    found = found_of(best_setting_facts(results, three, PRODUCT))
+    assert found["may be as good"].startswith("2 of 11 others: ")
+    assert found["significantly worse"] == "9 of 11 others"
     seen = three.assign(standing=three["standing"].where(three["rank"] != 4, SEEN_WORSE))
-    said = best_settings_sentence(results, seen, PRODUCT)
-    assert "1 is worse in what was seen, where a rare failure is not ruled out; the rest" in said
-    all_seen = table.assign(tied=table["rank"] == 1, standing=SEEN_WORSE)
-    said = best_settings_sentence(results, all_seen, PRODUCT)
-    assert "All 11 others are worse in what was seen, where a rare failure is not ruled" in said
+    found = found_of(best_setting_facts(results, seen, PRODUCT))
+    assert found[f"worse in what was seen, where {NOT_RULED_OUT}"] == "1 of 11 others"
+    assert found["significantly worse"] == "8 of 11 others"
 
 
 def test_cells_that_differ_by_many_standard_errors_are_not_said_to_be_as_good(results):
@@ -265,9 +267,10 @@ def test_a_study_with_a_selection_has_one_best_setting_its_own(tmp_path, capsys)
     wide = results.missions.pivot(index="replication", columns="point", values="reward")
     leads = wide.sub(wide[best], axis=0).mean()  # on common replications
     assert leads[table["point"][1:]].is_monotonic_decreasing
-    said = best_settings_sentence(results, table, "reward")
-    assert f"C_S {results.store.manifest.points[best].values['charge_start']}" in said
-    assert "All 5 others are ruled out by the selection." in said
+    start = results.store.manifest.points[best].values["charge_start"]
+    assert f"C_S {start}" in best_setting_headline(results, table, "reward")
+    found = found_of(best_setting_facts(results, table, "reward"))
+    assert found["ruled out or significantly worse"] == "5 of 5 others"
     assert (
         average_over_others(results, ["charge_start", "charge_complete"], "reward").loc[
             best, "standing"

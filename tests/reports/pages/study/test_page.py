@@ -70,7 +70,7 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
             "Which number of UAVs and number of charging pads are the best on the sea small?"
             in text
         )
-        assert "The best setting is " in text
+        assert "The best is " in text
     assert len(Page(page).find_hidden(STUDY)) == 1
     assert Page(index).find_hidden(STUDY) == []  # it stands on the page
 

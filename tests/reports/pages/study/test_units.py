@@ -2,8 +2,7 @@
 
 from dess.analysis import load_results
 from dess.analysis.ask import around, limits
-from dess.analysis.ask.assumptions import assumption_sentences
-from dess.analysis.ask.brief import brief_sentences
+from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
 from dess.reports.pages.study import make_study_report
@@ -13,7 +12,7 @@ from tests.reports.small import said_by, words_of
 
 A4 = 182, 269  # less the margins [mm]
 PIXEL = 25.4 / 96  # [mm]
-SHEET_OF_PAPER = ("h1", "figure.lead", "main > .gallery", ".brief", ".assumptions")
+SHEET_OF_PAPER = ("h1", "figure.lead", ".facts", "main > .gallery", ".assumptions")
 
 
 def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
@@ -24,9 +23,9 @@ def test_a_sheet_needs_no_prices_and_prices_no_requirement(tmp_path):
         question = sweep_question({"uavs": (1, 2)}, scenario, ["greedy"], 10, **asked)
         report = make_study_report(question.ask())
         said = said_by(report, results=str(question.out))
-        assert "The best setting is greedy with " in said
-        assert "Who flies: the policy greedy" in said
-        assert ("Prices: 20,000 EUR for a UAV." in said) == bool(prices)
+        assert "The best is greedy with " in said
+        assert "greedy, which knows the data left" in said
+        assert ("a UAV 20,000 EUR" in said) == bool(prices)
 
 
 def test_the_page_of_an_own_sea_tells_what_the_terminal_tells(tmp_path):
@@ -45,8 +44,9 @@ def test_the_page_of_an_own_sea_tells_what_the_terminal_tells(tmp_path):
         (tmp_path / "results" / "sweeps").glob("*/"), key=lambda path: len(path.name)
     )
     found = load_results(folder)
-    for sentence in (*brief_sentences(found), *assumption_sentences(found)):
-        assert sentence in said
+    answer = settings_answer(found)
+    for fact in (*answer.facts(), *answer.assumptions()):
+        assert fact.found in said
     assert "EUR a year" in said
     assert "The panel of this page has no costs" not in said
     assert "Its age of information is the median." in said
@@ -68,12 +68,7 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
     with notebooks_here(is_drawn=True):
         path = render_study(found, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
-    for words in (
-        "A slot is 21 s",
-        "A cell is 315 m",
-        "What breaks it first",
-        "One more UAV, which",
-    ):
+    for words in ("21 s, a hundredth", "315 m wide", "wind that it bears", "one more UAV"):
         assert words in text
     assert "slots" not in text.split("How this page was made")[0].replace("communication slots", "")
     page = visit(path, round(A4[0] / PIXEL)).page

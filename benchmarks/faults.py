@@ -1,0 +1,299 @@
+"""Thirty faults planted by hand in the compiled rules, and which oracles of the tests catch them.
+
+``python benchmarks/faults.py`` copies the tree, plants one fault after the other in the copy, and
+runs the tests of each oracle; ``--fault NAME`` and ``--oracle NAME`` choose some of them. A fault
+compiles the rules anew, so all of them take hours on one core. ``benchmarks/mutants.py`` leaves
+compiled functions out.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+ROOT = Path(__file__).parents[1]
+
+
+class Fault(NamedTuple):
+    """A fault: in a file, one text in place of another, which stands there once."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+
+    def plant(self, root: Path) -> None:
+        """Plant it in a copy of the tree."""
+        path = root / self.file
+        path.write_text(self.change(path.read_text("utf-8")), "utf-8")
+
+    def change(self, source: str) -> str:
+        """The source of the file with the fault.
+
+        Raises:
+            ValueError: If the source has not the old text once.
+        """
+        count = source.count(self.old)
+        if count != 1:
+            raise ValueError(f"{self.name}: {self.file} has its text {count} times")
+        return source.replace(self.old, self.new)
+
+
+RULES, CHANNEL = "dess/model/rules.py", "dess/model/channel.py"
+CHARGING, AGE, ENERGY = "dess/physics/charging.py", "dess/physics/age.py", "dess/physics/energy.py"
+BATTERY, MOVES = "dess/model/guard/battery.py", "dess/model/guard/moves.py"
+MATCHING = "dess/model/guard/matching.py"
+
+FAULTS = (
+    # Rules.
+    Fault(
+        "a swap counts as a collision where swaps are allowed",
+        RULES,
+        "        mission.forbid_swaps != 0\n        and other.executed",
+        "        mission.forbid_swaps == 0\n        and other.executed",
+    ),
+    Fault(
+        "a cancelled move does not cancel those that it blocks",
+        RULES,
+        "                _cancel(u)\n                changed = True",
+        "                _cancel(u)\n                changed = False",
+    ),
+    Fault(
+        "a move that was overruled starts charging",
+        RULES,
+        "return is_ready and u.action == HOVER and u.zone >= 0",
+        "return is_ready and u.executed == HOVER and u.zone >= 0",
+    ),
+    Fault(
+        "a UAV that leaves the queue keeps the slot of its request",
+        RULES,
+        "            elif not may_charge(mission, u):\n                u.pad_request = -1",
+        "            elif not may_charge(mission, u):\n                u.pad_request += 0",
+    ),
+    Fault(
+        "a charge adds to a battery beyond C_C",
+        RULES,
+        "added = min(added, charge_limit(mission, u) - u.battery)",
+        "added = min(added, charge_limit(mission, u) + 1 - u.battery)",
+    ),
+    Fault(
+        "a UAV takes more data than a node has",
+        RULES,
+        "amount = min(channel.rate(mission, snr) * u.rate, residual[node])",
+        "amount = channel.rate(mission, snr) * u.rate",
+    ),
+    Fault(
+        "the rate of a type of UAVs is left out",
+        RULES,
+        "channel.rate(mission, snr) * u.rate",
+        "channel.rate(mission, snr)",
+    ),
+    Fault(
+        "data arrive one node late",
+        RULES,
+        "word = batch.words[k % 4, block]",
+        "word = batch.words[(k + 1) % 4, block]",
+    ),
+    Fault(
+        "the arrivals of a slot are not in the total",
+        RULES,
+        "            mission.arrived += arrivals[k]\n",
+        "            mission.arrived += 0.0\n",
+    ),
+    Fault(
+        "initial data are drawn with a larger spread",
+        RULES,
+        "residual[k] = low + (high - low) * streams.uniform(words[k % 4])",
+        "residual[k] = low + high * streams.uniform(words[k % 4])",
+    ),
+    # Channel.
+    Fault(
+        "the altitude is left out of the distance",
+        CHANNEL,
+        "distance = hypot(horizontal, scenario.altitude)",
+        "distance = hypot(horizontal, 0.0)",
+    ),
+    Fault(
+        "a path loss that is a fifth too small",
+        CHANNEL,
+        "loss = 10 * scenario.path_loss_exponent",
+        "loss = 8 * scenario.path_loss_exponent",
+    ),
+    Fault(
+        "on a tie the node with the highest index is served",
+        CHANNEL,
+        "if snr > best or (snr == best and k < node):",
+        "if snr > best or (snr == best and k > node):",
+    ),
+    Fault(
+        "the search ends before a node that may be better",
+        CHANNEL,
+        "if batch.rest + reach < best or",
+        "if batch.rest < best or",
+    ),
+    Fault(
+        "a UAV is a communication slot ahead on its way",
+        CHANNEL,
+        "ahead = (u.slots_left * m + m - 1 - n) * part",
+        "ahead = (u.slots_left * m + m - 2 - n) * part",
+    ),
+    Fault(
+        "the largest rate does not hold",
+        CHANNEL,
+        "return min(shannon, mission.max_rate)",
+        "return shannon",
+    ),
+    # Charging.
+    Fault(
+        "the queue prefers the highest battery",
+        CHARGING,
+        "return u.battery < other.battery",
+        "return u.battery > other.battery",
+    ),
+    Fault(
+        "what a fractional rate adds is rounded up",
+        CHARGING,
+        "return k * mission.charge_rate // mission.charge_slots",
+        "return -(-k * mission.charge_rate // mission.charge_slots)",
+    ),
+    Fault(
+        "a UAV on a pad takes power that is not left",
+        CHARGING,
+        "added = min(gain(mission, u, u.charge_slots + 1), lacking, left)",
+        "added = min(gain(mission, u, u.charge_slots + 1), lacking)",
+    ),
+    # Age.
+    Fault(
+        "the age falls to that of the slot before",
+        AGE,
+        "    mission.newest += now - sensor.newest\n    sensor.newest = now",
+        "    mission.newest += now - sensor.newest\n    sensor.newest = now - 1.0",
+    ),
+    Fault(
+        "the mean age leaves the last part out",
+        AGE,
+        "return (sensor.age_area + at_end * at_end / 2.0)",
+        "return (sensor.age_area + at_end / 2.0)",
+    ),
+    # Energy.
+    Fault(
+        "what is left of a percent is lost",
+        ENERGY,
+        "    u.remainder = spent % PERCENT",
+        "    u.remainder = 0",
+    ),
+    Fault(
+        "a move costs what hovering does",
+        ENERGY,
+        "cost = slot_cost_at(mission, u.slots_per_cell, u.executed, u.x, u.y)",
+        "cost = slot_cost_at(mission, u.slots_per_cell, HOVERING, u.x, u.y)",
+    ),
+    Fault(
+        "gusts blow from the other side",
+        ENERGY,
+        "        return mean + gusts * streams.normal(words[1])",
+        "        return mean - gusts * streams.normal(words[1])",
+    ),
+    # Guard.
+    Fault(
+        "the guard keeps no margin for teammates",
+        BATTERY,
+        "return _slot_of_detour(mission, u) * margin_slots(mission, u)",
+        "return 0 * _slot_of_detour(mission, u) * margin_slots(mission, u)",
+    ),
+    Fault(
+        "the guard forgets the slot of the charge",
+        MOVES,
+        "late = max(needed + waiting_slot(mission) + kept - usable_battery(mission, u), 0)",
+        "late = max(needed - 2 * waiting_slot(mission) + kept - usable_battery(mission, u), 0)",
+    ),
+    Fault(
+        "the guard does not wait for a pad",
+        MOVES,
+        "reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0",
+        "reserve = margin(mission, u) if charge else 0",
+    ),
+    Fault(
+        "the guard matches the cells by the plain ways",
+        MATCHING,
+        "prices[j, place] = bounded * bounded",
+        "prices[j, place] = bounded",
+    ),
+    Fault(
+        "a UAV in a queue may leave it",
+        MOVES,
+        "if charge and (u.pad_request >= 0 or (lands(mission) and parked)):",
+        "if charge and lands(mission) and parked:",
+    ),
+    Fault(
+        "nobody stays in a zone shortly before the end",
+        BATTERY,
+        "mission.max_slots - mission.slot <= LAST_SLOTS",
+        "mission.max_slots - mission.slot <= 0 * LAST_SLOTS",
+    ),
+)
+# The tests of each oracle. ``tests/verification/stress_des.py`` is none: it describes the model in
+# the form of a checklist, and runs no mission.
+ORACLES = {
+    "auditor": ("tests/dess/model/test_auditor.py",),
+    "by hand": ("tests/dess/model/test_missions.py",),
+    "closed forms": ("tests/verification/test_theory.py",),
+    "plain_sets": ("tests/dess/envs/observations/test_sets.py",),
+    "tiny_sea": ("tests/analysis/bound/test_optimum.py", "tests/analysis/bound/test_prices.py"),
+    "guard": ("tests/dess/model/guard/test_guard.py",),
+}
+
+
+def copy_tree(folder: Path) -> Path:
+    """Copy what git knows of the tree, its links as links."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for name in listed.stdout.split("\0")[:-1]:
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, target, follow_symlinks=False)
+    return folder
+
+
+def catches(oracle: str, root: Path) -> bool:
+    """Whether a test of an oracle fails in a copy of the tree."""
+    environment = os.environ | {
+        "PYTHONPATH": str(root),
+        "NUMBA_CACHE_DIR": str(root / "build" / "numba"),
+        "NUMBA_OPT": "1",
+    }
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider"]
+    tests = subprocess.run(
+        [*command, *ORACLES[oracle]], cwd=root, env=environment, stdout=subprocess.DEVNULL
+    )
+    return tests.returncode == 1
+
+
+def main() -> None:
+    """Plant the faults, and print which oracle catches which."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fault", action="append", help="a part of its name; repeatable")
+    parser.add_argument("--oracle", action="append", choices=ORACLES)
+    parser.add_argument("--out", type=Path, default=Path("faults.csv"))
+    options = parser.parse_args()
+    chosen = options.fault or [""]
+    rows = []
+    for fault in (f for f in FAULTS if any(part in f.name for part in chosen)):
+        with tempfile.TemporaryDirectory() as folder:
+            root = copy_tree(Path(folder))
+            fault.plant(root)
+            caught = {name: catches(name, root) for name in options.oracle or ORACLES}
+        rows.append({"fault": fault.name, "file": fault.file, **caught})
+        pd.DataFrame(rows).to_csv(options.out, index=False)
+        print(fault.name, *(name for name, is_caught in caught.items() if is_caught), sep="; ")
+
+
+if __name__ == "__main__":
+    main()
