@@ -28,6 +28,7 @@ from dess.model.channel import Site, empty_scratch, make_world
 from dess.model.record import empty_records
 from dess.model.state import (
     MISSION,
+    SENSOR,
     starts_of,
     state_of,
     teeth_lengths,
@@ -233,7 +234,7 @@ def _arrays_of(
         "missions": state.missions,
         "uavs": types_of(space, fleet)[None],
         "residual": state.residual,
-        "sensors": state.sensors,
+        "sensors": np.zeros(state.sensors.shape, SENSOR),
         "teeth": np.zeros((1, teeth), np.int32),
         "constants": _without_total(starts.constants.view(MISSION)),
         "ranges": starts.ranges,

@@ -39,7 +39,7 @@ def test_of_nodes_at_the_same_distance_the_first_is_served(slots):
 def test_the_planner_expects_the_same_rate_at_the_same_distance(slots):
     space = ScenarioSpace.model_validate({"communication_slots": slots})
     snr = channel.world_of(space).mean_snr
-    table = rates._mean_rate(snr, constants_of(space))
+    table = rates._mean_rate(snr, constants_of(space)[0])
     coarse, fine = np.indices(snr.shape)
     places = np.unique((slots * coarse) ** 2 + fine**2, return_inverse=True)[1].ravel()
     for values in (snr.ravel(), table.ravel()):
