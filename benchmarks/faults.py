@@ -116,14 +116,14 @@ FAULTS = (
     Fault(
         "the altitude is left out of the distance",
         CHANNEL,
-        "distance = hypot(horizontal, scenario.altitude)",
+        "distance = hypot(horizontal, link.altitude)",
         "distance = hypot(horizontal, 0.0)",
     ),
     Fault(
         "a path loss that is a fifth too small",
         CHANNEL,
-        "loss = 10 * scenario.path_loss_exponent",
-        "loss = 8 * scenario.path_loss_exponent",
+        "loss = 10 * link.path_loss_exponent",
+        "loss = 8 * link.path_loss_exponent",
     ),
     Fault(
         "on a tie the node with the highest index is served",

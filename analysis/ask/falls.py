@@ -74,7 +74,7 @@ class Fall:
     units: Units | None
 
     def facts(self) -> list[Fact]:
-        """How much less is collected, what the UAVs do instead, and which node loses most."""
+        """How much less is collected, what the UAVs do instead, which node loses most, and why."""
         metric = metric_of(RATIO)
         change = metric.change(*self.difference[["difference", "low", "high"]])
         doubt = ""
@@ -87,6 +87,11 @@ class Fall:
                 Fact(f"{where}: time of a UAV", ", ".join(self._changes_of_time())),
                 Fact(f"{where}: last data", self._last_data()),
                 Fact(f"{where}: node that loses most", self._worst_node()),
+                Fact(
+                    f"{where}: cause",
+                    f"{self.policy} and its return guard, not the fleet, which could leave unused "
+                    "what is added",
+                ),
             ]
         )
 

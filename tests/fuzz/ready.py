@@ -17,6 +17,7 @@ from tests.reports.small import STUDIES, quick
 
 # The names of the ready inputs.
 SCENARIO, STUDY, SELECTION, TRAINING = "sea.toml", "study.toml", "selection.toml", "training.toml"
+PROCESS = "logger.py"  # of which ``log_slots`` runs in a mission
 RESULTS, SELECTED, PAGE, POLICY = "results", "selected", "page.html", "policy"
 # A scenario with all sections, a study of it, and the results of the study.
 SECTIONS, STUDIED, EXTENDED = "sections.toml", "studied.toml", "extended"
@@ -43,7 +44,7 @@ SEAS += ("jade-bight.csv", "jade-bight.geojson")
 INPUTS = tuple(
     copy(name, f"in/{name}")
     for name in (
-        *(SCENARIO, SECTIONS, *SEAS, STUDY, SELECTION, STUDIED, TRAINING),
+        *(SCENARIO, SECTIONS, *SEAS, STUDY, SELECTION, STUDIED, TRAINING, PROCESS),
         *(RESULTS, SELECTED, EXTENDED, POLICY, PAGE),
     )
 )

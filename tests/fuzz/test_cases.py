@@ -79,6 +79,6 @@ def test_every_parameter_of_every_command_is_known():
         if any(word in (parameter.metavar or "") for word in files)
         and not commands.kinds_of(words, parameter)
     }
-    # Those of report are in strategies.reports; what is shown is one of the policies; and tables of
-    # nodes stand in scenarios, too.
-    assert unread - commands.OUTPUTS == {"--results", "--shown", "--nodes"}
+    # Those of report are in strategies.reports; what is shown is one of the policies; tables of
+    # nodes stand in scenarios, too; and a process is code of the user, which is run as it is.
+    assert unread - commands.OUTPUTS == {"--results", "--shown", "--nodes", "--process"}

@@ -113,6 +113,7 @@ def test_an_answer_says_why_one_more_uav_collects_less(searched):
     change = numbers.format_difference(now[node], before[node])
     text = f"[{x}, {y}], {share} of its data, not {share_before} ({change} ["
     assert found[f"{where}: node that loses most"].startswith(text)
+    assert "not the fleet" in found[f"{where}: cause"]
     (drawing,) = falls.draw_falls(searched)
     assert DRAWN in drawing.caption
     bars = drawing.figure.axes[0].patches

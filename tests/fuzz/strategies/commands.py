@@ -83,6 +83,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
     "--set": ("uavs=2", "initial_data=[5, 20]", "pads=1", "max_slots=20", *SETTINGS),
     "--baseline": ("uavs=1", "pads=2"),
     "--policy": ("greedy", "random,nearest", POLICY),
+    "--process": (f"../in/{ready.PROCESS}:log_slots",),
     "--shown": ("greedy",),
     "--missions": ("1", "2", "3"),
     "--workers": ("1",),
