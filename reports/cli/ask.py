@@ -99,14 +99,14 @@ def sweep(
     if metric:
         parameters["metric"] = question.measured_column(metric, "--metric")
     page = f"{PREFIX}{question.study.name}"
-    found = _run_question(question, page, out, workers, dry_run, yes)
-    _ask_around(question, found, page, out, workers)
-    answer = settings_answer(found, question, parameters.get("metric"))
+    asked_results = _run_question(question, page, out, workers, dry_run, yes)
+    _ask_around(question, asked_results, page, out, workers)
+    answer = settings_answer(asked_results, question, parameters.get("metric"))
 
     def render(progress: "Progress") -> Path:
         from dess.reports.pages.render import render_study
 
-        return render_study(found, out, progress, parameters)
+        return render_study(asked_results, out, progress, parameters)
 
     _print_answer(question, answer, render, as_json, "sweep")
 
@@ -156,8 +156,8 @@ def what_if(
     fixed = options.parse_all_settings(baseline or [], "--baseline")
     question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
     check_shown(question, shown)
-    found = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
-    answer = VariationAnswer(found, question, shown)
+    asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
+    answer = VariationAnswer(asked_results, question, shown)
     parameters = {
         "settings": changes,
         "baseline": fixed,

@@ -117,8 +117,8 @@ def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> li
         words = points_in_words(results)
         others = table[table["policy"] != policy].drop_duplicates("policy")
         for _, other in others.iterrows():
-            found = f"{words[other['point']]}; {measure.within} {_estimate(other, measure)}"
-            facts.append(Fact(f"with {other['policy']}", found))
+            other_setting = f"{words[other['point']]}; {measure.within} {_estimate(other, measure)}"
+            facts.append(Fact(f"with {other['policy']}", other_setting))
     facts.append(unequal_lengths(results, [measure]))
     return known_facts(facts)
 
@@ -150,7 +150,7 @@ def _comparison_facts(results: Results, others: pd.DataFrame) -> list[Fact]:
     facts = {label: f"{count:,} of {len(others):,} others" for label, count in counts.items()}
     if names:
         facts["may be as good"] += f": {names}"
-    return [Fact(label, found) for label, found in facts.items() if counts[label]]
+    return [Fact(label, text) for label, text in facts.items() if counts[label]]
 
 
 def unequal_lengths(results: Results, metrics: Iterable[Metric]) -> Fact:
