@@ -263,7 +263,11 @@ def copy_tree(folder: Path) -> Path:
 
 
 def catches(oracle: str, root: Path) -> bool:
-    """Whether a test of an oracle fails in a copy of the tree."""
+    """Whether a test of an oracle fails in a copy of the tree.
+
+    Raises:
+        RuntimeError: If its tests could not be run.
+    """
     environment = os.environ | {
         "PYTHONPATH": str(root),
         "NUMBA_CACHE_DIR": str(root / "build" / "numba"),
@@ -273,6 +277,8 @@ def catches(oracle: str, root: Path) -> bool:
     tests = subprocess.run(
         [*command, *ORACLES[oracle]], cwd=root, env=environment, stdout=subprocess.DEVNULL
     )
+    if tests.returncode not in (0, 1):
+        raise RuntimeError(f"{oracle}: pytest ended with exit code {tests.returncode}")
     return tests.returncode == 1
 
 
