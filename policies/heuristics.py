@@ -138,17 +138,17 @@ def _choose_legal_actions(
     for row in range(len(rows_mission)):
         i = rows_uav[row]
         mission, team = missions[rows_mission[row]], uavs[rows_mission[row]]
-        actions[row] = choose_at_random(mission, team, i, legal_moves(chart, team[i]))
+        actions[row] = choose_at_random(mission, team, i, legal_moves(chart, team[i]), chart)
     return actions
 
 
 @inlined
-def choose_at_random(mission, team, i, allowed):
+def choose_at_random(mission, team, i, allowed, chart):
     """A random one of the allowed moves into uncontested cells; Hover where there is none.
 
     ``allowed`` has a bit for each action.
     """
-    levels = contests(mission, team, i)
+    levels = contests(mission, team, i, chart)
     moves = count = 0
     for action in range(4):
         if allowed >> action & 1 and contest(levels, action) == 0:
@@ -197,7 +197,7 @@ def choose_action(
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
     if kind == RANDOM:
-        return choose_at_random(mission, team, i, safe)
+        return choose_at_random(mission, team, i, safe, chart)
     goal_x, goal_y = home.x, home.y
     node = _choose_goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
@@ -212,7 +212,7 @@ def choose_action(
 def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
-    levels = contests(mission, team, i)
+    levels = contests(mission, team, i, chart)
     best = HOVER
     least = 1e18
     for action in range(5):

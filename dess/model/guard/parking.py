@@ -244,7 +244,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
         memory.planned[j] = -1
         if not o.active or o.zone < 0:
             continue
-        keeps = _has_cell(mission, o, are_matched) or not is_crowded(mission, chart, o.zone)
+        keeps = _has_cell(mission, o, chart, are_matched) or not is_crowded(mission, chart, o.zone)
         if not are_matched:
             keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
@@ -252,7 +252,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
     for place in range(count):
         j = memory.order[place]
         o = uavs[j]
-        if j != i and (o.grounded or _has_cell(mission, o, are_matched)):
+        if j != i and (o.grounded or _has_cell(mission, o, chart, are_matched)):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
@@ -268,11 +268,11 @@ def _choose(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
-def _has_cell(mission, u, are_matched):
+def _has_cell(mission, u, chart, are_matched):
     """Whether a UAV keeps its cell, and chooses none."""
     if are_matched:
         return keeps_cell(mission, u)
-    return is_parked(mission, u)
+    return is_parked(mission, u, chart)
 
 
 @inlined
