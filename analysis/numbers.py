@@ -2,13 +2,16 @@
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from types import MappingProxyType
 
 import pandas as pd
 
 # What a spreadsheet takes as the beginning of a formula.
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
-# The rounding errors of sums and differences are smaller than this, and no quantity is.
-_ROUNDING = 1e-12
+# How many digits numbers have, here and in the scripts of pages: decimals of a share in percent,
+# significant digits of a quantity, the size from which it is whole, and that below which it is but
+# a rounding error of 0.
+DIGITS = MappingProxyType({"percent": 1, "quantity": 4, "whole": 1000, "zero": 1e-12})
 _NAN = re.compile(r"\bnan\b")
 
 
@@ -20,14 +23,18 @@ def why_nan(cells: Iterable[object]) -> str:
     return ""
 
 
+def _format_hundredfold(share: float) -> str:
+    return format_minus(f"{100 * share:.{DIGITS['percent']}f}")
+
+
 def format_percent(value: float) -> str:
     """``0.9731`` as ``97.3 %``."""
-    return f"{format_minus(f'{100 * value:.1f}')} %"
+    return f"{_format_hundredfold(value)} %"
 
 
 def format_interval(mean: float, low: float, high: float) -> str:
     """A mean and its interval as ``97.3 % [96.1, 98.1]``."""
-    ends = [format_minus(f"{100 * end:.1f}") for end in (low, high)]
+    ends = map(_format_hundredfold, (low, high))
     return f"{format_percent(mean)} [{', '.join(ends)}]"
 
 
@@ -61,12 +68,12 @@ def format_decimals(value: float, low: float, high: float, digits: int = 3) -> s
 
 def format_quantity(value: float) -> str:
     """A number with about four digits, as ``1,042`` or ``12.35``; 0 if it is but rounding of 0."""
-    if abs(value) < _ROUNDING:
+    if abs(value) < DIGITS["zero"]:
         return "0"
-    if abs(value) >= 1000:
+    if abs(value) >= DIGITS["whole"]:
         text = f"{value:,.0f}"
     else:
-        text = f"{value:.4g}"
+        text = f"{value:.{DIGITS['quantity']}g}"
     return text.replace("-", "−")
 
 

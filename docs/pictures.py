@@ -108,9 +108,9 @@ def draw_gallery(pages: Path) -> None:
             _keep_picture(name, window.screenshot(), path)
         path = pages / f"{ASKED}.html"
         window.goto(path.resolve().as_uri())
-        window.get_by_role("button", name="Run").click()
+        window.get_by_role("button", name="Run", exact=True).click()
         window.get_by_text("bit for bit").wait_for()
-        window.get_by_role("button", name="Run", disabled=False).wait_for()
+        window.get_by_role("button", name="Run", exact=True, disabled=False).wait_for()
         _keep_picture(PANEL, window.locator("#panel").screenshot(), path)
 
 

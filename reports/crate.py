@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from datetime import date
 from importlib import metadata
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import tomli_w
@@ -22,6 +21,7 @@ from dess.analysis import numbers
 from dess.analysis.results.chunks import BOUNDS, MANIFEST, partition_name
 from dess.analysis.results.parquet import files_in
 from dess.analysis.results.tables import Results
+from dess.base.commands import command_line
 from dess.base.files import documents, tables
 from dess.base.files.reading import read_bytes
 from dess.base.files.writing import write_zip
@@ -67,7 +67,7 @@ def check_page(page: Path, results: Results) -> None:
     Raises:
         InputError: If the file is not a page, shows other results, or has been changed.
     """
-    allowed = f"their page, as dess report {quote(str(results.store.folder))} writes it"
+    allowed = f"their page, as {command_line('report', results.store.folder)} writes it"
     shown = Page.read(page, LIMIT, allowed)
     keys = [evidence.key for evidence in shown.evidence]
     if keys != [results.store.manifest.key] or not shown.is_sealed:

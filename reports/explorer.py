@@ -132,12 +132,14 @@ def make_explorer(results: Results) -> HTML:
     columns = ["mean", "low", "high", "n"]
     fields = [names.field_named(field) for field in grid.values]
     data = {
-        "sliders": [
+        "settings": [
             {
-                "name": field.plain,
+                "key": field.key,
+                "name": field.name,
+                "plain": field.plain,
                 "unit": field.unit,
-                "values": [names.value_text(value) for value in grid.values[field.key]],
-                "settings": grid.format_settings(field.key),
+                "texts": [names.value_text(value) for value in grid.values[field.key]],
+                "options": grid.format_settings(field.key),
             }
             for field in fields
         ],
@@ -148,8 +150,10 @@ def make_explorer(results: Results) -> HTML:
             for *ends, n in grid.means[columns].itertuples(index=False)
         ],
     }
-    shown = {"fields": fields, "policies": styles, "metrics": grid.metrics, "texts": texts}
-    return render_part("explorer.html", data=data, **shown)
+    middle = [len(values) // 2 for values in grid.values.values()]
+    shown = {"policies": styles, "metrics": grid.metrics, "texts": texts}
+    start = {"explorer": {"positions": middle}}
+    return render_part("explorer.html", data=data, start=start, **shown)
 
 
 def _round_to_tenths(share: float) -> int:

@@ -24,7 +24,7 @@ from dess.reports.pages.templates import (
     fill_page,
     load_template,
     pack,
-    panel_script,
+    page_script,
 )
 
 log = logging.getLogger(__name__)
@@ -78,7 +78,7 @@ def render_example() -> str:
         missions="1,000",
         module=pack(module),
         image=pack(json.dumps(about["image"]).encode()),
-        script=panel_script(EXAMPLE_SCRIPT),
+        script=page_script(EXAMPLE_SCRIPT),
     )
 
 

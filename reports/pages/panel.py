@@ -38,7 +38,6 @@ from dess.analysis.metrics import (
 from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
 from dess.analysis.stats.requirement import Requirement
-from dess.analysis.stats.verdict import rule_for_pages
 from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
@@ -55,7 +54,7 @@ from dess.reports.pages.templates import (
     PANEL_SCRIPT,
     SINGLE_SCRIPT,
     pack,
-    panel_script,
+    page_script,
     render_part,
 )
 from dess.scenario.data_sheet import Units
@@ -206,7 +205,6 @@ class Panel(Document):
             "fixed": [f"{key}={toml_value(self.given[key])}" for key in fixed],
             "policies": [name for name in KINDS if name != "random-unguarded"],
             "metrics": metrics,
-            "rule": rule_for_pages(),
             "prices": [*_describe_prices(self.costs)],
             "priced": [*_other_prices(self.costs)],
             "grid": self._grid(settings),
@@ -229,7 +227,7 @@ class Panel(Document):
                 module=pack(read_module()),
                 image=pack(json.dumps(image.document()).encode()),
                 sides=SIDES,
-                script=panel_script(SINGLE_SCRIPT if self.is_single else PANEL_SCRIPT),
+                script=page_script(SINGLE_SCRIPT if self.is_single else PANEL_SCRIPT),
                 currency=self.costs.currency if self.costs else "",
                 year=self.costs.annuity_in_words if self.costs and self.costs.years else "",
                 start={side: {"policy": self.policy, "positions": starts[side]} for side in SIDES},
@@ -682,6 +680,7 @@ def _describe_metrics(
             "neutral": metric.is_neutral,
             "isOutcome": metric.is_outcome,
             "isOffered": name in offered and not metric.is_neutral,
+            "isListed": name == PRODUCT or (name == "cost" and costs is not None),
             "option": _REQUIRED.get(name, ""),
             "tolerance": _tolerance_of(name, tolerance, space),
             "suffix": f" {metric.unit}" if name == AGE and space.units else "",

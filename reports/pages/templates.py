@@ -19,9 +19,20 @@ import dess
 from dess.reports.pages.markdown import Marked, escape_text
 from dess.reports.pages.page import Page
 
-# The templates of the scripts that simulate: a panel, another mission, the example of the index.
-PANEL_SCRIPT, SINGLE_SCRIPT = "panel_script.js", "another_script.js"
-EXAMPLE_SCRIPT = "try_script.js"
+# The scripts that simulate: a panel, another mission, the example of the index.
+PANEL_SCRIPT, SINGLE_SCRIPT, EXAMPLE_SCRIPT = "panel", "another", "try"
+_COMMON = ("engine", "panel_numbers", "panel_controls", "panel_view")
+# The scripts of pages, each with the templates that it is made of.
+_SCRIPTS = {
+    PANEL_SCRIPT: (
+        *("player", *_COMMON, "panel_commands", "panel_crew"),
+        *("sha256", "replay", "panel_runs", "panel_grid", "panel"),
+    ),
+    SINGLE_SCRIPT: (*_COMMON, "panel_commands", "sha256", "replay", "another"),
+    EXAMPLE_SCRIPT: (*_COMMON, "panel_crew", "try"),
+    "worker": ("engine", "panel_worker"),
+    "explorer": ("panel_numbers", "panel_commands", "panel_controls", "explorer"),
+}
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
 # What all templates have in common: they escape values, and one that is undefined is an error.
 JINJA: dict[str, Any] = {"autoescape": select_autoescape(), "undefined": StrictUndefined}
@@ -46,25 +57,34 @@ def load_template(name: str, **filters: Callable[..., str]) -> Template:
         finalize = _escape_unless_marked
     loader = PackageLoader("dess.reports", "templates")
     environment = Environment(loader=loader, finalize=finalize, trim_blocks=True, **JINJA)
-    environment.globals["panel_hash"] = panel_hash
+    environment.globals |= {"panel_hash": panel_hash, "page_script": page_script}
+    environment.globals["rules"] = rules_for_scripts
     environment.filters |= {"indexed": set_indices, "explained": Markup.escape, **filters}
     return environment.get_template(name)
 
 
-@cache
-def panel_script(name: str) -> str:
-    """The script of a panel, from its template."""
-    template = load_template(name)
-    if name == EXAMPLE_SCRIPT:  # which draws nothing
-        return template.render()
-    from dess.analysis.figures import style  # for the pages that have one
+def rules_for_scripts() -> dict[str, Any]:
+    """What scripts of pages have from Python: the digits of numbers, and the judge's rule."""
+    from dess.analysis.numbers import DIGITS  # an index is made without them
+    from dess.analysis.stats.verdict import rule_for_pages
 
-    return template.render(style=style)
+    return {"digits": dict(DIGITS), "verdicts": rule_for_pages()}
+
+
+@cache
+def page_script(name: str) -> str:
+    """A script of pages, from its templates."""
+    colours = {}
+    if "player" in _SCRIPTS[name]:
+        from dess.analysis.figures import style  # for the pages that have one
+
+        colours["style"] = style
+    return "\n".join(load_template(f"{part}.js").render(colours) for part in _SCRIPTS[name])
 
 
 def panel_hash(name: str) -> str:
     """The hash by which a page lets a browser run the script of a panel, and no other."""
-    return b64encode(sha256(panel_script(name).encode()).digest()).decode()
+    return b64encode(sha256(page_script(name).encode()).digest()).decode()
 
 
 def pack(content: bytes) -> str:
@@ -88,7 +108,7 @@ def fill_page(
 
     A browser makes no request for the page, and runs scripts only if ``scripts`` is set. If
     ``simulates`` is set, it runs the script of a panel, and its WebAssembly module; the script of
-    *another mission* needs both. The templates of these scripts have the names ``..._script.js``.
+    *another mission* needs both.
     """
     permitted = {"scripts": scripts, "simulates": simulates, "script": script}
     page = load_template(name).render(version=dess.__version__, **permitted, **values)

@@ -15,6 +15,12 @@ const WORDS = 5; // of the table of arrays, for each array: its address and up t
  *     arrays: ArrayOfImage[], fields: Record<string, Record<string, [number, string, number]>>,
  *     metrics: string[], totals: string[], policies: Record<string, number>, sliders: Slider[], isBare?: boolean,
  * }} Image
+ * @typedef { {module: WebAssembly.Module, image: Image}} Simulator
+ */
+
+/**
+ * The positions of all sliders, and the policy.
+ * @typedef { {positions: number[], policy: string}} Choice
  */
 
 /** @param {string} text */
@@ -35,7 +41,7 @@ async function unpack(id) {
 /**
  * The module and the image that a page contains.
  * @param {string} name - the beginning of the ids of both
- * @returns {Promise<{module: WebAssembly.Module, image: Image}>}
+ * @returns {Promise<Simulator>}
  */
 async function unpackEngine(name) {
     const module = await WebAssembly.compile(await unpack(`${name}-module`));
@@ -44,15 +50,23 @@ async function unpackEngine(name) {
     return {module, image};
 }
 
+/**
+ * Arrays of a kind, one behind the other.
+ * @type {(kind: any, parts: any[]) => any}
+ */
+function joined(kind, parts) {
+    const whole = new kind(parts.reduce((sum, part) => sum + part.length, 0));
+    parts.reduce((end, part) => (whole.set(part, end), end + part.length), 0);
+    return whole;
+}
+
 class Engine {
-    // Lay out the arrays of an image; `setting` has the positions of some sliders, by their names.
-    // A bare image has no scenario, and only adds up values.
+    // Lay out the arrays of an image. A bare image has no scenario, and only adds up values.
     /**
-     * @param {WebAssembly.Module} module
-     * @param {Image} image
-     * @param {Record<string, number>} setting
+     * @param {Simulator} simulator
+     * @param {number[]} positions - of the sliders; by default they change nothing
      */
-    constructor(module, image, setting = {}) {
+    constructor({module, image}, positions = []) {
         /** @type {any} */
         this.exports = new WebAssembly.Instance(module, {}).exports;
         this.image = image;
@@ -69,8 +83,7 @@ class Engine {
             if (array.bytes) this.write(array.name, 0, array.bytes);
             if (array.fill === "nan") this.floats(array.name).fill(NaN);
         }
-        for (const slider of image.sliders)
-            if (slider.setting in setting) this.move(slider, setting[slider.setting]);
+        positions.forEach((position, n) => this.move(image.sliders[n], position));
         if (!image.isBare) this.exports.prepare();
     }
 
@@ -118,9 +131,7 @@ class Engine {
             const size = bytes.length / shape[0];
             return bytes.subarray(row * size, (row + 1) * size);
         });
-        const record = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
-        parts.reduce((end, part) => (record.set(part, end), end + part.length), 0);
-        return record;
+        return joined(Uint8Array, parts);
     }
 
     // A field of all records of an array.
@@ -147,27 +158,21 @@ class Engine {
             for (const [offset, part] of parts) this.write(array, offset, bytesOfBase64(part));
     }
 
-    // All UAVs follow the policy of this number.
+    /**
+     * All UAVs follow a policy.
+     * @param {string} policy
+     */
     follow(policy) {
-        this.integers("policies").fill(BigInt(policy));
+        this.integers("policies").fill(BigInt(this.image.policies[policy]));
     }
 }
 
 /**
- * Say in the place of a panel why its page cannot simulate.
- * @param {any} root
- * @param {Error} error
+ * The engine of a choice.
+ * @type {(simulator: Simulator, choice: Choice) => Engine}
  */
-function sayWhyNot(root, error) {
-    const line = document.createElement("p");
-    line.className = "note";
-    line.textContent = `This page cannot simulate missions here: ${error.message}. ${FORBIDDEN}`;
-    root.replaceChildren(line);
-    root.hidden = false;
-}
-
-// Refuse a browser that lacks what a page needs to simulate.
-function checkBrowser() {
-    for (const name of ["WebAssembly", "DecompressionStream", "Worker"])
-        if (!(/** @type {any} */ (window))[name]) throw new Error(`the browser has no ${name}`);
+function engineOf(simulator, {positions, policy}) {
+    const engine = new Engine(simulator, positions);
+    engine.follow(policy);
+    return engine;
 }

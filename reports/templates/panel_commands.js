@@ -1,10 +1,4 @@
-// Commands for what a reader has chosen. They are made of the page's own names and numbers, and
-// quoted for the shell.
-
-/**
- * The positions of all sliders, and the policy.
- * @typedef { {positions: number[], policy: string}} Choice
- */
+// What a reader takes along: commands for what he has chosen, and tables as CSV.
 
 /**
  * A setting that a reader may change.
@@ -23,28 +17,67 @@
  * @typedef { {scenario: string, seed: number, fixed: string[], settings: Setting[]}} Named
  */
 
+const EXPLORATION = "exploration, not verified"; // what leaves a panel says so
+
 /** @type {(choice: Choice) => string} */
 const keyOf = ({positions, policy}) => [policy, ...positions].join(" ");
-const quoted = (/** @type {string} */ text) => /^[\w.=,-]+$/.test(text) ? text : `'${text.replaceAll("'", `'\\''`)}'`;
-
-/** @type {(about: Named, choice: Choice, option: string, isLeftOut: (setting: Setting, n: number) => boolean) => string[]} */
-const optionsOf = ({settings}, {positions}, option, isLeftOut) => settings.flatMap((setting, n) =>
-    isLeftOut(setting, n) ? [] : [`${option} ${quoted(setting.options[positions[n]])}`]);
-
-/** @type {(about: Named, choice: Choice, option: string) => string[]} */
-const allOptionsOf = (about, choice, option) => [
-    ...about.fixed.map((setting) => `${option} ${quoted(setting)}`),
-    ...optionsOf(about, choice, option, (setting, n) => choice.positions[n] === setting.default),
-];
 
 /**
- * A table as CSV, which says that it is exploration, and what a study of it is.
+ * A word for the shell, quoted as Python's shlex quotes it.
+ * @type {(text: string) => string}
+ */
+const quoted = (text) => /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", `'"'"'`)}'`;
+
+/**
+ * Options of a command; one that is a list is repeated.
+ * @type {(options: Record<string, string | number | string[]>) => string}
+ */
+const optionsInWords = (options) => Object.entries(options).flatMap(([name, value]) =>
+    [value].flat().map((each) => `--${name} ${quoted(String(each))}`)).join(" ");
+
+/** @type {(name: string, options: Record<string, string | number | string[]>) => string} */
+const commandLine = (name, options) => `dess ${name} ${optionsInWords(options)}`;
+
+/**
+ * What commands say of the settings that are not left out.
+ * @type {(about: Named, choice: Choice, isLeftOut: (setting: Setting, n: number) => boolean) => string[]}
+ */
+const valuesOf = ({settings}, {positions}, isLeftOut) => settings.flatMap((setting, n) =>
+    isLeftOut(setting, n) ? [] : [setting.options[positions[n]]]);
+
+/** @type {(about: Named, choice: Choice) => string[]} */
+const allValuesOf = (about, choice) =>
+    [...about.fixed, ...valuesOf(about, choice, (setting, n) => choice.positions[n] === setting.default)];
+
+/** @type {(about: Named, choice: Choice, replication: number) => string} */
+const simulateCommand = (about, choice, replication) => commandLine("simulate", {
+    policy: choice.policy, scenario: about.scenario, set: allValuesOf(about, choice), seed: about.seed, replication,
+});
+
+/**
+ * The study of two choices: both settings with both policies.
+ * @type {(about: Named, a: Choice, b: Choice, missions: number) => string}
+ */
+function studyCommand(about, a, b, missions) {
+    const policy = [...new Set([a.policy, b.policy])].join(",");
+    const common = {policy, scenario: about.scenario, seed: about.seed, missions: Math.max(missions, 2)};
+    const changes = valuesOf(about, b, (_, n) => a.positions[n] === b.positions[n]);
+    if (!changes.length) return commandLine("sweep", {set: allValuesOf(about, a), ...common});
+    return commandLine("what-if", {baseline: allValuesOf(about, a), set: changes, ...common});
+}
+
+/**
+ * A table as CSV, which says that it is exploration, and what a study of it is. As in Python, text
+ * that a spreadsheet would take as a formula begins with an apostrophe.
  * @type {(rows: (string | number)[][], command: string) => string}
  */
 function csvOf(rows, command) {
-    const cell = (/** @type {string | number} */ content) => /[",]/.test(String(content)) ? `"${String(content).replaceAll('"', '""')}"` : content;
-    const lines = [...`${EXPLORATION}\n${command}`.trim().split("\n").map((line) => `# ${line}`), ...rows.map((row) => row.map(cell).join(","))];
-    return `${lines.join("\n")}\n`;
+    const cell = (/** @type {string | number} */ content) => {
+        const text = typeof content === "string" ? content.replace(/^[=+\-@\t\r]/, "'$&") : String(content);
+        return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+    };
+    const about = `${EXPLORATION}\n${command}`.trim().split("\n").map((line) => `# ${line}`);
+    return [...about, ...rows.map((row) => row.map(cell).join(",")), ""].join("\n");
 }
 
 /**
@@ -59,8 +92,5 @@ function save(name, content) {
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** @type {(about: Named, choice: Choice, replication: number) => string} */
-function simulateCommand(about, choice, replication) {
-    return ["dess simulate", `--policy ${quoted(choice.policy)}`, `--scenario ${quoted(about.scenario)}`,
-        ...allOptionsOf(about, choice, "--set"), `--seed ${about.seed}`, `--replication ${replication}`].join(" ");
-}
+/** @type {(name: string, rows: (string | number)[][], command: string) => void} */
+const saveTable = (name, rows, command) => save(name, new Blob([csvOf(rows, command)], {type: "text/csv"}));

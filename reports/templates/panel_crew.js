@@ -4,9 +4,7 @@
  * What a worker is asked for: some missions of a setting.
  * @typedef {object} Order
  * @property {string} name - of the track
- * @property {string} key - of the setting: equal keys have equal missions
- * @property {Record<string, number>} setting - the positions of the sliders
- * @property {number} policy - the number of the policy
+ * @property {Choice} choice
  * @property {number[]} prices
  * @property {boolean} wantsRecords
  * @property {number} first - the replication of the first mission
@@ -45,18 +43,17 @@ const rowsOf = (/** @type {Image} */ image, /** @type {string} */ name) =>
 // Sums and intervals of a series of missions, or of the differences of two, computed by the module.
 class Series {
     /**
-     * @param {WebAssembly.Module} module
-     * @param {Image} image
-     * @param {Record<string, number>} setting
+     * @param {Simulator} simulator
+     * @param {number[]} positions
      * @param {number[]} prices
      * @param {number | null} error - the probability that an interval fails, if not that of the image
      */
-    constructor(module, image, setting, prices = [], error = null) {
-        const arrays = image.arrays.map((array) =>
+    constructor(simulator, positions = [], prices = [], error = null) {
+        const {image} = simulator, arrays = image.arrays.map((array) =>
             array.bytes || SUMMED.includes(array.name) ? array : {...array, shape: array.shape.map(() => 0)});
-        this.module = module;
-        this.image = image;
-        this.engine = new Engine(module, {...image, arrays, isBare: true}, setting);
+        this.simulator = simulator;
+        this.width = image.metrics.length;
+        this.engine = new Engine({...simulator, image: {...image, arrays, isBare: true}}, positions);
         this.count = 0;
         if (error !== null) {
             const bounds = this.engine.floats("bounds");
@@ -72,7 +69,7 @@ class Series {
      * @param {Series} after
      */
     static ofDifferences(before, after) {
-        const series = new Series(before.module, before.image, {}), bounds = series.engine.floats("bounds");
+        const series = new Series(before.simulator), bounds = series.engine.floats("bounds");
         const [ours, theirs] = [before, after].map(({engine}) => engine.floats("bounds"));
         for (let metric = 0; metric < bounds.length; metric += BOUNDS) {
             bounds[metric] = Math.min(ours[metric], theirs[metric]);
@@ -88,7 +85,7 @@ class Series {
      * @param {Float64Array | null} baseline
      */
     add(values, baseline = null) {
-        const width = this.image.metrics.length, most = rowsOf(this.image, "values") * width;
+        const {width} = this, most = rowsOf(this.simulator.image, "values") * width;
         for (let begin = 0; begin < values.length; begin += most) {
             const rows = values.subarray(begin, begin + most), count = rows.length / width;
             this.engine.floats("values").set(rows);
@@ -107,26 +104,32 @@ class Series {
      */
     estimate({column}) {
         const [totals, ends] = [this.engine.floats("totals"), this.engine.floats("ends")];
-        const width = totals.length / this.image.metrics.length;
-        const [count, sum] = totals.slice(column * width);
+        const [count, sum] = totals.slice(column * totals.length / this.width);
         const [low, high, lowSeen, highSeen] = ends.slice(ENDS * column);
         return {mean: sum / count, low, high, lowSeen, highSeen, count};
     }
 }
 
 // The missions of a setting, of which only the unbroken beginning counts.
-class Track {
+class Track extends Series {
     /**
-     * @param {Series} series
-     * @param {Omit<Order, "first" | "count" | "wantsRecords">} order
+     * @param {Simulator} simulator
+     * @param {string} name
+     * @param {Choice} choice
+     * @param {number[]} prices
+     * @param {number | null} error
      */
-    constructor(series, order) {
-        this.series = series;
-        this.order = order;
+    constructor(simulator, name, choice, prices = [], error = null) {
+        super(simulator, choice.positions, prices, error);
+        this.name = name;
+        this.choice = choice;
+        this.prices = prices;
         this.asked = 0;
         this.took = 0; // by a mission [ms]
         /** @type {Map<number, Float64Array>} */
         this.waiting = new Map();
+        /** @type {Float64Array[]} */
+        this.parts = [];
     }
 
     /**
@@ -135,93 +138,88 @@ class Track {
      * @returns {Order}
      */
     next(most) {
-        const fit = this.took ? Math.floor(PORTION / this.took) : 1;
-        const first = this.asked, count = Math.min(Math.max(fit, 1), rowsOf(this.series.image, "values"), most);
+        const {name, choice, prices, asked: first} = this, fit = this.took ? Math.floor(PORTION / this.took) : 1;
+        const count = Math.min(Math.max(fit, 1), rowsOf(this.simulator.image, "values"), most);
         this.asked += count;
-        return {...this.order, first, count, wantsRecords: false};
+        return {name, choice, prices, first, count, wantsRecords: false};
     }
 
     /**
      * Take what a worker answers.
      * @param {Answer} answer
-     * @returns {Float64Array[]} the values that count from now on
      */
     take({first, count, values, took}) {
         this.took = took / count;
         this.waiting.set(first, values);
-        const added = [];
-        for (let rows; (rows = this.waiting.get(this.series.count)); added.push(rows)) {
-            this.waiting.delete(this.series.count);
-            this.series.add(rows);
+        for (let rows; (rows = this.waiting.get(this.count)); this.parts.push(rows)) {
+            this.waiting.delete(this.count);
+            this.add(rows);
         }
-        return added;
     }
 
     // Forget the missions after the unbroken beginning, so that they are asked for again.
     rewind() {
         this.waiting.clear();
-        this.asked = this.series.count;
+        this.asked = this.count;
+    }
+
+    // The values of the missions, in their order.
+    get values() {
+        if (this.parts.length !== 1) this.parts = [joined(Float64Array, this.parts)];
+        return this.parts[0];
     }
 }
 
-// The missions of one or two tracks, and the differences of two, B - A.
+/**
+ * The missions of one or two tracks, and the differences of two, B - A.
+ * @template {Track} [T=Track]
+ */
 class Comparison {
     /**
-     * @param {Record<string, Track>} tracks
+     * @param {T[]} tracks
      * @param {number} target - the missions of each
      */
     constructor(tracks, target) {
         this.tracks = tracks;
-        this.sides = Object.keys(tracks);
         this.target = target;
-        this.isOver = false;
         this.seconds = 0;
         this.began = performance.now();
-        this.width = tracks[this.sides[0]].series.image.metrics.length;
-        /** @type {Record<string, Float64Array[]>} */
-        this.values = Object.fromEntries(this.sides.map((side) => [side, []]));
-        const [a, b] = this.sides.map((side) => tracks[side].series);
         /** @type {Series | null} */
-        this.difference = b ? Series.ofDifferences(a, b) : null;
+        this.difference = tracks.length > 1 ? Series.ofDifferences(tracks[0], tracks[1]) : null;
+        this.addDifferences();
+        this.isOver = this.isComplete;
+        tracks.forEach((track) => track.rewind());
     }
 
-    // The next missions of the side of which fewer have been given out.
+    // The number of missions that all tracks have.
+    get count() {
+        return Math.min(...this.tracks.map(({count}) => count));
+    }
+
+    get isComplete() {
+        return this.count >= this.target;
+    }
+
+    // The next missions of the track of which fewer have been given out.
     next() {
-        const open = this.sides.filter((side) => this.tracks[side].asked < this.target);
-        if (!open.length) return null;
-        const side = open.reduce((least, other) => this.tracks[other].asked < this.tracks[least].asked ? other : least);
-        return this.tracks[side].next(this.target - this.tracks[side].asked);
+        const track = this.tracks.reduce((least, other) => other.asked < least.asked ? other : least);
+        return track.asked < this.target ? track.next(this.target - track.asked) : null;
     }
 
     /** @param {Answer} answer */
     take(answer) {
-        this.values[answer.name].push(...this.tracks[answer.name].take(answer));
+        this.tracks.find(({name}) => name === answer.name).take(answer);
         this.addDifferences();
-        this.isOver = this.sides.every((side) => this.count(side) >= this.target);
+        this.isOver = this.isComplete;
         if (this.isOver) this.seconds = (performance.now() - this.began) / 1000;
     }
 
-    /** @param {string} side */
-    count(side) {
-        return this.tracks[side].series.count;
-    }
-
-    // The differences of the missions that both sides have.
+    // The differences of the missions that both tracks have.
     addDifferences() {
         if (!this.difference) return;
-        const [a, b] = this.sides.map((side) => this.valuesOf(side)), from = this.difference.count * this.width;
+        const [a, b] = this.tracks.map(({values}) => values), from = this.difference.count * this.difference.width;
         const end = Math.min(a.length, b.length);
         if (end > from) this.difference.add(b.subarray(from, end), a.subarray(from, end));
-    }
-
-    /**
-     * The values of the missions of a side, in their order.
-     * @param {string} side
-     */
-    valuesOf(side) {
-        const parts = this.values[side];
-        if (parts.length !== 1) this.values[side] = [joined(parts)];
-        return this.values[side][0];
     }
 
     /**
@@ -230,7 +228,7 @@ class Comparison {
      * @param {Metric} metric
      */
     inWords(metric) {
-        const estimates = this.sides.map((side) => this.tracks[side].series.estimate(metric));
+        const estimates = this.tracks.map((track) => track.estimate(metric));
         if (!estimates.some(({count}) => count)) return null;
         const texts = estimates.map((estimate) => estimate.count ? interval(metric, estimate) : "");
         if (!this.difference) return [...texts, "the same as A", "", ""];
@@ -239,24 +237,15 @@ class Comparison {
     }
 }
 
-/** @param {Float64Array[]} parts */
-function joined(parts) {
-    const whole = new Float64Array(parts.reduce((sum, part) => sum + part.length, 0));
-    parts.reduce((end, part) => (whole.set(part, end), end + part.length), 0);
-    return whole;
-}
-
 // The workers, which do one job at a time.
 class Crew {
     /**
-     * @param {string} source - the script of a worker
-     * @param { {module: WebAssembly.Module, image: Image}} engine
-     * @param {(why: string) => void} fail - called when a worker dies
+     * @param {Simulator} simulator
+     * @param {(why?: string) => void} changed - called after each answer, and with the reason when a worker dies
      */
-    constructor(source, engine, fail) {
-        this.source = source;
-        this.engine = engine;
-        this.fail = fail;
+    constructor(simulator, changed) {
+        this.simulator = simulator;
+        this.changed = changed;
         this.number = 0;
         /** @type {Member[]} */
         this.members = [];
@@ -286,9 +275,15 @@ class Crew {
         this.members = this.members.filter(({isBusy}) => !isBusy);
     }
 
+    /** @param {Job} job */
+    isDoing(job) {
+        return job !== null && this.job === job && !job.isOver;
+    }
+
     /** @returns {Member} */
     hire() {
-        const address = URL.createObjectURL(new Blob([this.source], {type: "text/javascript"}));
+        const source = document.getElementById("panel-worker").textContent;
+        const address = URL.createObjectURL(new Blob([source], {type: "text/javascript"}));
         const member = {worker: new Worker(address), isBusy: false};
         URL.revokeObjectURL(address);
         member.worker.onmessage = (event) => this.take(member, event.data);
@@ -296,7 +291,7 @@ class Crew {
             event.preventDefault();
             this.lose(event.message || "a worker died");
         };
-        member.worker.postMessage(this.engine);
+        member.worker.postMessage(this.simulator);
         return member;
     }
 
@@ -305,7 +300,8 @@ class Crew {
      * @param {string} why
      */
     lose(why) {
-        this.fail(this.hasWorked
+        this.end();
+        this.changed(this.hasWorked
             ? `The browser ended the simulation (${why}); what is shown is of the missions before.`
             : `This page cannot simulate missions here: its workers cannot start (${why}). ${FORBIDDEN}`);
     }
@@ -333,5 +329,6 @@ class Crew {
         if (!this.job || answer.job !== this.number) return;
         this.job.take(answer);
         this.give(member);
+        this.changed();
     }
 }

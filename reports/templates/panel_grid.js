@@ -2,12 +2,8 @@
 // requirements. Its intervals hold together and for any bounds, so that these may be moved.
 
 /**
- * A fleet, by the positions of both settings, and its missions.
- * @typedef {object} Cell
- * @property {number} uavs
- * @property {number} pads
- * @property {string} name - in words
- * @property {Track} track
+ * A fleet in words, where the table has it, and its missions.
+ * @typedef { {name: string, place: HTMLElement, track: Track}} Cell
  */
 
 const GRID_ERROR = 0.05; // the probability that an interval of any cell fails
@@ -20,14 +16,12 @@ class Grid {
      * @param {Requirement[]} requirements
      * @param {Metric} cost
      * @param {number} indifference - the least saving that matters
-     * @param {Rule} rule
      */
-    constructor(cells, requirements, cost, indifference, rule) {
+    constructor(cells, requirements, cost, indifference) {
         this.cells = cells;
         this.requirements = requirements;
         this.cost = cost;
         this.indifference = indifference;
-        this.rule = rule;
         this.isOver = true;
         this.target = 0; // missions in all
         this.away = 0; // orders that are not answered
@@ -46,7 +40,7 @@ class Grid {
     }
 
     get count() {
-        return this.cells.reduce((sum, {track}) => sum + track.series.count, 0);
+        return this.cells.reduce((sum, {track}) => sum + track.count, 0);
     }
 
     get asked() {
@@ -59,7 +53,7 @@ class Grid {
 
     /** @param {Cell} cell */
     costOf(cell) {
-        return cell.track.series.estimate(this.cost);
+        return cell.track.estimate(this.cost);
     }
 
     /**
@@ -71,12 +65,12 @@ class Grid {
     needed() {
         const begun = this.cells.filter(({track}) => track.asked < FEWEST);
         if (begun.length) return begun;
-        if (this.cells.some(({track}) => track.series.count < FEWEST)) return [];
+        if (this.cells.some(({track}) => track.count < FEWEST)) return [];
         const answer = this.cheapest();
         if (answer) return answer.rivals.length ? [answer.cell, ...answer.rivals] : [];
         const possible = this.cells.filter((cell) => this.verdict(cell) === "open");
         const isPromising = (/** @type {Cell} */ {track}) => this.requirements.every((required) =>
-            roomOf(required, track.series.estimate(required.metric).mean) >= 0);
+            roomOf(required, track.estimate(required.metric).mean) >= 0);
         const most = Math.min(...possible.filter(isPromising).map((cell) => this.costOf(cell).mean)) + this.indifference;
         return possible.filter((cell) => this.costOf(cell).mean <= most);
     }
@@ -99,10 +93,10 @@ class Grid {
 
     /** @param {Answer} answer */
     take(answer) {
-        const {values} = answer, {image} = this.cells[0].track.series, width = image.metrics.length;
+        const {values} = answer, {width} = this.cells[0].track;
         for (let place = 0; place < values.length; place++) // what no requirement asks for needs no interval
             if (!this.columns.has(place % width)) values[place] = NaN;
-        this.cells.find(({track}) => track.order.name === answer.name)?.track.take(answer);
+        this.cells.find(({track}) => track.name === answer.name)?.track.take(answer);
         this.away -= 1;
         this.isOver = this.away === 0 && !this.hasWork();
     }
@@ -114,8 +108,8 @@ class Grid {
      */
     verdict({track}) {
         const verdicts = this.requirements.map((required) =>
-            verdict(this.rule, required, track.series.estimate(required.metric), required.metric.tolerance));
-        return this.rule.mostSeriousFirst.find((word) => verdicts.includes(word));
+            verdict(required, track.estimate(required.metric), required.metric.tolerance));
+        return VERDICTS.mostSeriousFirst.find((word) => verdicts.includes(word));
     }
 
     /**
@@ -140,7 +134,7 @@ class Grid {
             const possible = this.cells.some((cell) => this.verdict(cell) === "open");
             return possible ? "No cell is known to meet the requirements." : "No cell meets the requirements.";
         }
-        const {cell, rivals} = answer, amount = written(this.cost, cell.track.series.estimate(this.cost).mean);
+        const {cell, rivals} = answer, amount = written(this.cost, cell.track.estimate(this.cost).mean);
         if (!rivals.length) return `The cheapest is ${cell.name} for ${amount}: every cheaper cell misses the requirements.`;
         return `The cheapest so far is ${cell.name} for ${amount}; ${rivals.map(({name}) => name).join("; ")} may be cheaper.`;
     }
@@ -153,30 +147,26 @@ class Grid {
         const metrics = [...this.requirements.map(({metric}) => metric), this.cost];
         const head = metrics.flatMap(({key}) => [key, `${key}_low`, `${key}_high`]);
         return [["fleet", "verdict", "missions", ...head], ...this.cells.map((cell) => {
-            const {series} = cell.track, estimates = metrics.map((metric) => series.estimate(metric));
-            return [cell.name, this.verdict(cell), series.count, ...estimates.flatMap(({mean, low, high}) => [mean, low, high])];
+            const {track} = cell, estimates = metrics.map((metric) => track.estimate(metric));
+            return [cell.name, this.verdict(cell), track.count, ...estimates.flatMap(({mean, low, high}) => [mean, low, high])];
         })];
     }
 
-    /**
-     * Write into the table what is known of each cell, and frame the cheapest.
-     * @param {HTMLElement} table
-     */
-    show(table) {
+    // Write into the table what is known of each cell, and frame the cheapest.
+    show() {
         const answer = this.cheapest();
         for (const cell of this.cells) {
-            const place = /** @type {HTMLElement} */ (table.querySelector(`[data-cell="${cell.uavs} ${cell.pads}"]`));
-            const {series} = cell.track, word = this.verdict(cell), mark = document.createElement("strong");
+            const {place, track} = cell, word = this.verdict(cell), mark = document.createElement("strong");
             mark.textContent = word;
             const isFramed = answer?.cell === cell;
-            place.className = `${series.count ? word : ""} ${isFramed ? (answer.rivals.length ? "leading" : "cheapest") : ""}`.trim();
-            if (!series.count) {
+            place.className = `${track.count ? word : ""} ${isFramed ? (answer.rivals.length ? "leading" : "cheapest") : ""}`.trim();
+            if (!track.count) {
                 place.textContent = "";
                 continue;
             }
-            const details = this.requirements.map(({metric}) => `${metric.name} ${interval(metric, series.estimate(metric))}`);
-            details.push(`${grouped(series.count)} missions`);
-            const lines = [written(this.cost, series.estimate(this.cost).mean), ...details];
+            const details = this.requirements.map(({metric}) => `${metric.name} ${interval(metric, track.estimate(metric))}`);
+            details.push(`${grouped(track.count)} missions`);
+            const lines = [written(this.cost, track.estimate(this.cost).mean), ...details];
             if (isFramed) lines.unshift(answer.rivals.length ? "cheapest so far" : "cheapest");
             place.replaceChildren(mark, ...lines.map((line) => {
                 const part = document.createElement("span");

@@ -12,6 +12,7 @@
  * @property {boolean} neutral - whether neither more nor less is better
  * @property {boolean} isOutcome - whether it is 0 or 1 in each mission: what allows for failures is then exact
  * @property {boolean} isOffered - whether a reader may require it
+ * @property {boolean} isListed - whether the list of runs has it
  * @property {number} tolerance - how far from a bound either verdict of the grid is right
  * @property {string} suffix - of an amount on the command line
  * @property {string} option - its name on the command line, if a search can require it
@@ -27,41 +28,45 @@
  * @typedef { {metric: Metric, bound: number}} Requirement
  */
 
-const minus = (/** @type {string} */ text) => (Number(text.replaceAll(",", "")) ? text.replace("-", "−") : text.replace("-", ""));
+// Of Python: the digits of numbers, and the verdicts by what is known of a bound.
+const {digits: DIGITS, verdicts: VERDICTS} = JSON.parse('{{ rules() | tojson }}');
 
-/** @param {number} number */
-function grouped(number, digits = 0) {
-    return number.toLocaleString("en-US", {minimumFractionDigits: digits, maximumFractionDigits: digits});
-}
+const minus = (/** @type {string} */ text) => text.replaceAll("-", Number(text.replaceAll(",", "")) ? "−" : "");
+const grouped = (/** @type {number} */ number) => number.toLocaleString("en-US");
 
 /**
- * One decimal; a number in the middle of two becomes the even one, as in Python.
- * @param {number} number
+ * A number with so many decimals, as Python writes it: of two that are equally near, the even one. `Intl.NumberFormat`
+ * rounds the shortest decimals of a number, and so makes 0.2 of 0.15, which is less than that.
+ * @type {(number: number, decimals: number) => string}
  */
-function tenths(number) {
-    const isTie = Number.isInteger(number * 4) && !Number.isInteger(number * 2);
-    if (!isTie) return number.toFixed(1);
-    const below = Math.floor(number * 10);
-    return ((below % 2 ? below + 1 : below) / 10).toFixed(1);
+function fixed(number, decimals) {
+    const rounded = number.toFixed(decimals), exact = number.toFixed(decimals + 40);
+    const isTie = /50{39}$/.test(exact), isOdd = Number(rounded.at(-1)) % 2 === 1;
+    return isTie && isOdd ? exact.slice(0, -40).replace(/\.$/, "") : rounded;
 }
+
+/** @param {number} share */
+const percent = (share) => minus(fixed(100 * share, DIGITS.percent));
 
 /** @param {number} number */
 function quantity(number) {
-    if (Math.abs(number) < 1e-12) return "0";
-    if (Math.abs(number) >= 1000) return minus(grouped(number));
-    return minus(String(Number(number.toPrecision(4))));
+    const size = Math.abs(number);
+    if (size < DIGITS.zero) return "0";
+    if (size >= DIGITS.whole) return minus(grouped(Number(fixed(number, 0))));
+    const [mantissa, exponent] = number.toExponential(DIGITS.quantity - 1).split("e").map(Number);
+    if (exponent < -4) return minus(`${mantissa}e-${String(-exponent).padStart(2, "0")}`);
+    return minus(String(Number(fixed(number, DIGITS.quantity - 1 - exponent))));
 }
 
 /** @type {(metric: Metric, number: number) => string} */
-function written({percent, unit}, number) {
-    if (percent) return `${minus(tenths(100 * number))} %`;
-    return `${quantity(number)} ${unit}`.trim();
-}
+const amount = (metric, number) => metric.percent ? percent(number) : quantity(number);
 
-/** @type {(metric: Metric, estimate: Estimate) => string} */
+/** @type {(metric: Metric, number: number) => string} */
+const written = (metric, number) => `${amount(metric, number)} ${metric.percent ? "%" : metric.unit}`.trim();
+
+/** @type {(metric: Metric, estimate: Pick<Estimate, "mean" | "low" | "high">) => string} */
 function interval(metric, {mean, low, high}) {
-    const end = (/** @type {number} */ number) => metric.percent ? minus(tenths(100 * number)) : quantity(number);
-    const ends = [low, high].map((number) => Number.isFinite(number) ? end(number) : "?");
+    const ends = [low, high].map((number) => Number.isFinite(number) ? amount(metric, number) : "?");
     return `${written(metric, mean)} [${ends.join(", ")}]`;
 }
 
@@ -70,17 +75,17 @@ function interval(metric, {mean, low, high}) {
  * @type {(metric: Metric, estimate: Pick<Estimate, "mean" | "low" | "high">) => string}
  */
 function difference(metric, {mean, low, high}) {
-    const write = (/** @type {number} */ number) => signed(metric, number);
-    return `${write(mean)} [${write(low)}, ${write(high)}] ${unitOfDifference(metric)}`.trim();
+    const [middle, ...ends] = [mean, low, high].map((number) => signed(metric, number));
+    return `${middle} [${ends.join(", ")}] ${unitOfDifference(metric)}`.trim();
 }
 
 /** @type {(metric: Metric) => string} */
 const unitOfDifference = ({percent, unit}) => percent ? "points" : unit;
 
 /** @type {(metric: Metric, number: number) => string} */
-function signed({percent}, number) {
+function signed(metric, number) {
     if (!Number.isFinite(number)) return "?";
-    const text = percent ? minus(tenths(100 * number)) : quantity(number);
+    const text = amount(metric, number);
     return number > 0 && Number(text) !== 0 ? `+${text}` : text;
 }
 
@@ -128,8 +133,8 @@ function moreMissions({mean, low, high, count}) {
 
 /** @type {(requirement: Requirement) => string} */
 function requirementInWords({metric, bound}) {
-    const amount = metric.percent ? `${quantity(100 * bound)} %` : written(metric, bound);
-    return `${metric.name} of at ${metric.less ? "most" : "least"} ${amount}`;
+    const text = metric.percent ? `${quantity(100 * bound)} %` : written(metric, bound);
+    return `${metric.name} of at ${metric.less ? "most" : "least"} ${text}`;
 }
 
 /**
@@ -139,18 +144,13 @@ function requirementInWords({metric, bound}) {
 const roomOf = ({metric, bound}, number) => metric.less ? bound - number : number - bound;
 
 /**
- * The verdicts by what is known of a bound, as ``stats/verdict.py`` has them.
- * @typedef { {mostSeriousFirst: string[], table: (string | null)[][]}} Rule
- */
-
-/**
  * Whether a whole interval keeps a bound, breaks it, or neither. Both are known only within the
  * tolerance of the bound: there the mean decides.
- * @type {(rule: Rule, requirement: Requirement, estimate: Estimate, tolerance?: number) => string}
+ * @type {(requirement: Requirement, estimate: Estimate, tolerance?: number) => string}
  */
-function verdict({table}, requirement, {mean, low, high, count}, tolerance = 0) {
+function verdict(requirement, {mean, low, high, count}, tolerance = 0) {
     const rooms = count ? [low, high].map((end) => roomOf(requirement, end)) : [NaN];
     const isKept = Math.min(...rooms) >= -tolerance, isBroken = Math.max(...rooms) < tolerance;
-    const isMeanGood = roomOf(requirement, mean) >= 0;
+    const isMeanGood = roomOf(requirement, mean) >= 0, {table} = VERDICTS;
     return table[Number(isKept)][Number(isBroken)] ?? table[Number(isMeanGood)][Number(!isMeanGood)];
 }

@@ -2,23 +2,21 @@
 
 const MOST_MEMORY = 2 ** 27; // of the engines that a worker keeps [bytes]
 
-/** @type {WebAssembly.Module} */
-let module;
-/** @type {Image} */
-let image;
+/** @type {Simulator} */
+let simulator;
 /** @type {Map<string, Engine>} */
-const engines = new Map(); // by the keys of their settings, the one used last at the end
+const engines = new Map(); // by the positions of their sliders, the one used last at the end
 
 onmessage = ({data}) => {
     if (data.module) {
-        ({module, image} = data);
+        simulator = data;
         return;
     }
     const {name, first, count, job, wantsRecords} = data;
-    const engine = engineOf(data), began = performance.now();
+    const engine = keptEngine(data), began = performance.now();
     engine.call("play", first, count);
     engine.call("measure", count);
-    const values = engine.floats("values").slice(0, count * image.metrics.length);
+    const values = engine.floats("values").slice(0, count * engine.image.metrics.length);
     const records = wantsRecords ? Array.from({length: count}, (_, row) => engine.record(row)) : null;
     postMessage({name, first, count, job, values, records, took: performance.now() - began});
 };
@@ -27,9 +25,10 @@ onmessage = ({data}) => {
  * The engine of a setting; those that were used long ago are forgotten.
  * @param {Order} order
  */
-function engineOf({key, setting, policy, prices}) {
-    const size = image.arrays.reduce((sum, {item, shape}) => sum + shape.reduce((product, length) => product * length, item), 0);
-    const engine = engines.get(key) ?? new Engine(module, image, setting);
+function keptEngine({choice: {positions, policy}, prices}) {
+    const key = positions.join(" "), {arrays} = simulator.image;
+    const size = arrays.reduce((sum, {item, shape}) => sum + shape.reduce((product, length) => product * length, item), 0);
+    const engine = engines.get(key) ?? new Engine(simulator, positions);
     engines.delete(key);
     for (const other of engines.keys()) if ((engines.size + 1) * size > MOST_MEMORY) engines.delete(other);
     engines.set(key, engine);

@@ -1,5 +1,3 @@
-const EXPLORATION = "exploration, not verified"; // what leaves a panel says so
-
 // A mission that the engine of a page simulates slot by slot, as player.js shows it.
 // `sea` is what the player draws of the scenario.
 function replay(engine, replication, sea, title) {

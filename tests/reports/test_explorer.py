@@ -98,7 +98,7 @@ def test_moving_a_slider_shows_the_figures_of_the_grid(visit, results, document)
     page, places = opened.page, [*START]
     check(page, results, START)
     for number, (field, values) in enumerate(DESIGN.items()):
-        slider = page.locator(f"input[name={field}]")
+        slider = page.locator(f"input[name=explorer-{field}]")
         page.locator("[name=along]").select_option(str(number))
         for key, place in (("Home", 0), ("ArrowRight", 1), ("End", len(values) - 1)):
             slider.press(key)
@@ -108,9 +108,10 @@ def test_moving_a_slider_shows_the_figures_of_the_grid(visit, results, document)
     page.locator("[name=metric]").select_option("0")
     check_curve(page, results, tuple(places), len(DESIGN) - 1)
     assert (
-        page.locator("input[name=initial_data]").get_attribute("aria-valuetext") == "5 data units"
+        page.locator("[name=explorer-initial_data]").get_attribute("aria-valuetext")
+        == "5 data units"
     )
-    assert page.get_by_role("slider", name="Number of UAVs").get_attribute("name") == "uavs"
+    assert page.get_by_role("slider", name="Number of UAVs").get_attribute("id") == "explorer-uavs"
     command = page.locator(".setting code").text_content()
     assert command == "--set uavs=3 --set charge_complete=60 --set initial_data=5"
     assert page.evaluate("document.documentElement.scrollWidth") <= 390

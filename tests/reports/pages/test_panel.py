@@ -298,7 +298,7 @@ def test_the_missions_of_a_panel_of_another_version_are_checked(document, tmp_pa
 def run(tab: Tab, missions: int = MISSIONS) -> str:
     """Run the missions, and return what the panel says of them."""
     tab.locator("[name=missions]").fill(str(missions))
-    tab.get_by_role("button", name="Run").click()
+    tab.get_by_role("button", name="Run", exact=True).click()
     status = tab.locator("[data-panel=status]")
     status.get_by_text(re.compile(r"in [\d.]+ s\.")).wait_for(timeout=PATIENCE)
     return str(status.text_content())
@@ -557,6 +557,59 @@ def test_a_becomes_b_and_all_is_as_before(visit, document):
         assert tab.locator(f"[name={name}]").input_value() == value
 
 
+def test_runs_are_listed_and_any_two_are_compared(visit, document):
+    """With the keyboard; each is shown as it was, and a moved slider marks what is shown."""
+    opened = visit(document, 390)
+    tab = opened.page
+    run(tab, 60)
+    first = cells_of(tab, metric_of(PRODUCT).name)
+    tab.locator("#panel summary").first.press("Enter")
+    tab.locator("[name=b-uavs]").press("End")
+    tab.locator("[name=price-uav]").evaluate("input => { input.value = 2000; }")
+    run(tab, 40)
+    listed = tab.locator("[data-panel=run-rows] tr")
+    rows = [row.locator("td").all_text_contents() for row in listed.all()]
+    assert [(changes, missions) for changes, missions, _ in rows] == [
+        ("nothing", "60"),
+        ("Number of UAVs 1 → 2", "60"),
+        ("A UAV 2,000", "40"),
+        ("Number of UAVs 1 → 8; A UAV 2,000", "40"),
+    ]
+    assert rows[0][2].startswith(f"Product {first[0]}; Cost ")
+    buttons = tab.locator("[data-panel=run-rows] button")
+    buttons.nth(1).press("Enter")
+    assert cells_of(tab, metric_of(PRODUCT).name) == [first[1], "the same as A", "", ""]
+    assert tab.locator("[name=a-uavs]").input_value() == "1"
+    assert tab.locator("[name=price-uav]").input_value() == "1000"
+    buttons.nth(0).press("Space")
+    swapped = cells_of(tab, metric_of(PRODUCT).name)
+    assert swapped[:2] == first[1::-1]
+    assert swapped[2].startswith(first[2].partition(" ")[0].replace("+", "−"))
+    pressed = [button.get_attribute("aria-pressed") for button in buttons.all()]
+    assert pressed == ["true", "true", "false", "false"]
+    assert buttons.all_text_contents() == ["Run 1: B", "Run 2: A", "Run 3", "Run 4"]
+    assert tab.locator("[data-panel=before]").is_hidden()
+    tab.locator("[name=a-uavs]").press("End")
+    assert tab.locator("[data-panel=before]").is_visible()
+    buttons.nth(0).press("Enter")
+    assert tab.locator("[data-panel=before]").is_hidden()
+    assert "same as those of Python" in str(tab.locator("[data-panel=status]").text_content())
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+    assert opened.complaints == []
+
+
+def test_a_run_goes_on_where_it_ended(visit, document):
+    """Its missions are not simulated twice: those of A are there when only B has changed."""
+    tab = visit(document, 1280).page
+    run(tab, 40)
+    run(tab, 90)
+    counts = tab.locator("[data-panel=run-rows] tr td:nth-child(3)")
+    assert counts.all_text_contents() == ["90", "90"]
+    records = simulate_batch(load_scenario("paper", uavs=1), policies.load("greedy"), SEED, 90)
+    mean = 100 * records.missions[PRODUCT].mean()
+    assert cells_of(tab, metric_of(PRODUCT).name)[0].startswith(f"{mean:.1f} % [")
+
+
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory) -> Path:
     """A page with the panel of a search for the cheapest fleet."""
@@ -725,7 +778,7 @@ def test_the_index_simulates_its_example(visit, tmp_path):
     opened = visit(path, 390)
     tab = opened.page
     tab.locator("[name=b-uavs]").press("Home")
-    tab.get_by_role("button", name="Run").click()
+    tab.get_by_role("button", name="Run", exact=True).click()
     done = re.compile(r"^1,000 missions of each\.")
     tab.locator("[data-panel=status]").get_by_text(done).wait_for(timeout=PATIENCE)
     column = METRICS_OF_MODULE.index(PRODUCT)
@@ -750,11 +803,11 @@ def test_an_index_has_no_example_of_another_version(monkeypatch, tmp_path):
 def test_missions_are_stopped(visit, document):
     tab = visit(document, 1280).page
     tab.locator("[name=missions]").fill("100000")
-    tab.get_by_role("button", name="Run").click()
+    tab.get_by_role("button", name="Run", exact=True).click()
     tab.locator("[data-panel=status]").get_by_text("running").wait_for(timeout=PATIENCE)
     tab.get_by_role("button", name="Stop").click()
     assert "stopped" in str(tab.locator("[data-panel=status]").text_content())
-    assert tab.get_by_role("button", name="Run").is_enabled()
+    assert tab.get_by_role("button", name="Run", exact=True).is_enabled()
 
 
 def test_the_address_is_text_of_strangers(visit, document, tmp_path):

@@ -1,7 +1,0 @@
-{% include "engine.js" %}
-
-{% include "panel_numbers.js" %}
-
-{% include "panel_crew.js" %}
-
-{% include "try.js" %}
