@@ -31,33 +31,28 @@ def needed_draws(
     blocks = deviates = 0
     for replication in range(missions):
         rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
-        mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
-        sensors, teeth = state.sensors[0], state.teeth[0]
-        scratch = empty_scratch(len(uavs), len(residual))
-        counts = _count(
-            mission, uavs, residual, sensors, teeth, actions[replication],
-            *world_of(scenario), *scratch,
-        )  # fmt: skip
+        scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
+        counts = _count(state, world_of(scenario), scratch, actions[replication])
         blocks, deviates = blocks + counts[0], deviates + counts[1]
     return blocks, deviates
 
 
 @kernel
-def _count(
-    mission, uavs, residual, sensors, teeth, actions,
-    nodes, mean_snr, order, means, chart, batches, search,
-):  # fmt: skip
+def _count(state, world, scratch, actions):
     """Simulate one mission and count."""
-    arrivals = np.empty(len(nodes))
+    mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
+    sensors, teeth = state.sensors[0], state.teeth[0]
+    nodes, mean_snr, order, means, chart = world
+    batches, search, _ = scratch
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
     blocks = deviates = 0
     while mission.active > 0:
         for i in range(mission.uavs):
             uavs[i].action = actions[mission.slot, i]
-        rules.resolve(mission, uavs, chart)
+        rules.resolve(mission, uavs, chart.zones)
         rules.grant_pads(mission, uavs)
         rules.spend(mission, uavs)
-        channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
+        channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart.zones, search)
         needed = np.zeros((mission.uavs, len(nodes)), np.bool_)
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
@@ -76,7 +71,7 @@ def _count(
                         deviates += 1
                         needed[i, k] = True
         blocks += needed.sum() + math.ceil(len(nodes) / 4)
-        rules.arrive(mission, residual, sensors, arrivals, batches, search)
+        rules.arrive(mission, residual, sensors, scratch)
         rules.settle(mission, uavs)
     return blocks, deviates
 

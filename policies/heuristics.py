@@ -48,10 +48,8 @@ class RandomUnguarded:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        chart = view.world.chart
-        return _choose_legal_actions(
-            view.state.missions, view.state.uavs, *chart, view.mission, view.uav
-        )
+        state, zones = view.state, view.world.chart.zones
+        return _choose_legal_actions(state.missions, state.uavs, zones, view.mission, view.uav)
 
 
 class _Heuristic:
@@ -70,7 +68,7 @@ class _Heuristic:
             circuit = plan_circuit(nodes, chart)
         return _choose_actions(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
-            *chart, view.ways.reach, view.mission, view.uav,
+            chart, view.ways.reach, view.mission, view.uav,
         )  # fmt: skip
 
 
@@ -130,15 +128,12 @@ KINDS = {"random-unguarded": UNGUARDED} | {
 
 
 @kernel
-def _choose_legal_actions(
-    missions, uavs, zones, parking, sizes, nearest, ways, rows, rows_mission, rows_uav
-):  # fmt: skip
-    chart = Chart(zones, parking, sizes, nearest, ways, rows)
+def _choose_legal_actions(missions, uavs, zones, rows_mission, rows_uav):
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
         i = rows_uav[row]
         mission, team = missions[rows_mission[row]], uavs[rows_mission[row]]
-        actions[row] = choose_at_random(mission, team, i, legal_moves(chart, team[i]))
+        actions[row] = choose_at_random(mission, team, i, legal_moves(zones, team[i]))
     return actions
 
 
@@ -169,10 +164,8 @@ def choose_at_random(mission, team, i, allowed):
 
 @kernel
 def _choose_actions(
-    kind, missions, uavs, residual, sensors, nodes, circuit,
-    zones, parking, sizes, nearest, ways, rows, reach, rows_mission, rows_uav,
-):  # fmt: skip
-    chart = Chart(zones, parking, sizes, nearest, ways, rows)  # takes longer as an argument
+    kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
+):
     actions = np.empty(len(rows_mission), np.int64)
     memory = parking_memory(chart, uavs.shape[1])
     last = -1

@@ -14,40 +14,30 @@ from dess.policies import heuristics
 
 @kernel
 def resolve(mission, uavs, chart):
-    rules.resolve(mission, uavs, chart)
+    rules.resolve(mission, uavs, chart.zones)
 
 
 @kernel
 def move(mission, uavs, chart):
-    rules.resolve(mission, uavs, chart)
+    rules.resolve(mission, uavs, chart.zones)
     rules.grant_pads(mission, uavs)
     rules.spend(mission, uavs)
 
 
 def arrive(mission, residual, arrivals):
     sensors = np.zeros(len(residual), SENSOR)
-    _arrive(mission, residual, sensors, arrivals, *empty_scratch(1, len(residual)))
+    scratch = empty_scratch(1, len(residual))
+    _arrive(mission, residual, sensors, scratch._replace(arrivals=arrivals))
 
 
 @kernel
-def _arrive(mission, residual, sensors, arrivals, batches, search):
-    rules.arrive(mission, residual, sensors, arrivals, batches, search)
+def _arrive(mission, residual, sensors, scratch):
+    rules.arrive(mission, residual, sensors, scratch)
 
 
 @kernel
 def settle(mission, uavs):
     rules.settle(mission, uavs)
-
-
-@kernel
-def advance(
-    mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, chart, batches, search,
-):  # fmt: skip
-    rules.advance(
-        mission, uavs, residual, sensors, teeth, arrivals,
-        nodes, mean_snr, order, means, chart, batches, search,
-    )  # fmt: skip
 
 
 @kernel
@@ -65,7 +55,7 @@ def distances(chart, x, y, to):
     """Shortest ways from cells, which may be closed, to cells."""
     found = np.full(len(x), FAR)
     for row in range(len(x)):
-        if is_open(chart, x[row], y[row]):
+        if is_open(chart.zones, x[row], y[row]):
             found[row] = distance(chart, x[row], y[row], to[row, 0], to[row, 1])
     return found
 

@@ -205,9 +205,8 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     record = state.missions[0]
     starts = np.stack([state.uavs[0][axis][: sampled.uavs] for axis in "xy"], axis=1)
     residual = state.residual[0]
-    data = _data_by(
-        record, residual, state.sensors[0], phases.slots, *empty_scratch(1, len(residual))
-    )
+    scratch = empty_scratch(1, len(residual))
+    data = _data_by(record, residual, state.sensors[0], phases.slots, scratch)
     world = world_of(scenario)
     if scenario.shadowing_variance > 0:
         points = POINTS
@@ -226,15 +225,14 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
 
 
 @kernel
-def _data_by(mission, residual, sensors, slots, batches, search):
+def _data_by(mission, residual, sensors, slots, scratch):
     """(T + 1, K) the data that each node has had by the start of slot t = 0..T."""
     data = np.empty((slots + 1, len(residual)))
-    arrivals = np.empty(len(residual))
     had = residual.copy()
     for t in range(slots):
         data[t] = had
         mission.slot = t
-        rules.arrive(mission, had, sensors, arrivals, batches, search)
+        rules.arrive(mission, had, sensors, scratch)
     data[slots] = had
     return data
 

@@ -23,7 +23,7 @@ from dess.analysis.stats.sequences import (
 )
 from dess.base.kernels import kernel
 from dess.model import rules
-from dess.model.channel import BATCH, World
+from dess.model.channel import BATCH, Scratch, World
 from dess.model.guard.parking import parking_memory
 from dess.model.record import (
     MISSION_RECORD,
@@ -198,6 +198,15 @@ def _world(table):
 
 
 @kernel
+def _scratch(table):
+    return Scratch(
+        _array2(table, _AT.batches, _BATCH),
+        _array2(table, _AT.search, _I8),
+        _array1(table, _AT.arrivals, _F8),
+    )
+
+
+@kernel
 def _records(table):
     return Records(
         _array1(table, _AT.mission_records, _MISSION_RECORD),
@@ -262,13 +271,12 @@ def play(table, first, count, launches, slots):
     state = _state(table)
     starts = _starts(table)
     world = _world(table)
+    scratch = _scratch(table)
     records = _records(table)
-    nodes, mean_snr, order, means, chart = world
+    nodes = world.nodes
+    chart = world.chart
     reach = _reach(table)
     ways = _array4(table, _AT.ways_home, _I4)
-    batches = _array2(table, _AT.batches, _BATCH)
-    search = _array2(table, _AT.search, _I8)
-    arrivals = _array1(table, _AT.arrivals, _F8)
     circuit = _array1(table, _AT.circuit, _I8)
     policies = _array1(table, _AT.policies, _I8)
     actions = _array1(table, _AT.actions, _I8)
@@ -277,7 +285,6 @@ def play(table, first, count, launches, slots):
     team = state.uavs[0]
     data = state.residual[0]
     sensors = state.sensors[0]
-    teeth = state.teeth[0]
     over = 0
     for row in range(count):
         if launches:
@@ -291,7 +298,7 @@ def play(table, first, count, launches, slots):
                 if not rules.may_act(team[i]):
                     continue
                 if policies[i] == UNGUARDED:
-                    legal = rules.legal_moves(chart, team[i])
+                    legal = rules.legal_moves(chart.zones, team[i])
                     actions[i] = choose_at_random(mission, team, i, legal)
                 else:
                     actions[i] = choose_action(
@@ -301,15 +308,12 @@ def play(table, first, count, launches, slots):
             for i in range(mission.uavs):  # all have decided before any action is written
                 if actions[i] >= 0:
                     team[i].action = actions[i]
-            rules.run_slot(
-                mission, team, data, sensors, teeth, arrivals,
-                nodes, mean_snr, order, means, chart, batches, search,
-            )  # fmt: skip
+            rules.run_slot(state, 0, world, scratch)
         if is_over(mission):
             over += 1
             for i in range(mission.uavs, len(team)):
                 records.uavs[row, i] = _NO_UAV[0]
-            write_record(mission, team, data, sensors, teeth, ways, records, row)
+            write_record(state, 0, ways, records, row)
     return over
 
 

@@ -149,8 +149,7 @@ class MissionStepper:
             (N, I) ``OUTCOME`` records.
         """
         outcome = np.zeros(self.state.uavs.shape, OUTCOME)
-        # For numba, the arrays one by one take less time than tuples of them.
-        _step(*self.state, *self.world, *self._scratch, actions, outcome)
+        _step(self.state, self.world, self._scratch, actions, outcome)
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:
@@ -171,27 +170,20 @@ def _launch(state, environments, starts, seeds, following):
 
 
 @kernel
-def _step(
-    missions, uavs, residual, sensors, teeth,
-    nodes, mean_snr, order, means, chart, batches, search, actions, out,
-):  # fmt: skip
+def _step(state, world, scratch, actions, out):
     """Run one slot of every mission and write the ``OUTCOME`` records."""
-    fleet = uavs.shape[1]
-    arrivals = np.empty(len(nodes))
+    fleet = state.uavs.shape[1]
     charged = np.empty(fleet, np.int64)
     collected = np.empty(fleet)
-    for b in range(len(missions)):
-        mission = missions[b]
-        team = uavs[b]
+    for b in range(len(state.missions)):
+        mission = state.missions[b]
+        team = state.uavs[b]
         for i in range(fleet):
             u = team[i]
             u.action = actions[b, i]
             out[b, i].acted = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
-        rules.advance(
-            mission, team, residual[b], sensors[b], teeth[b], arrivals,
-            nodes, mean_snr, order, means, chart, batches, search,
-        )  # fmt: skip
+        rules.run_slot(state, b, world, scratch)
         for i in range(fleet):
             u = team[i]
             to = out[b, i]
@@ -208,9 +200,8 @@ def _step(
                 for t in range(len(terms)):
                     to.reward_terms[t] = terms[t]
         # The rest of a mission whose last UAV has ended belongs to the step.
-        while rules.advance_without_uavs(
-            mission, team, residual[b], sensors[b], arrivals, batches, search
-        ):
+        residual, sensors = state.residual[b], state.sensors[b]
+        while rules.advance_without_uavs(mission, team, residual, sensors, scratch):
             pass
 
 

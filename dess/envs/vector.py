@@ -147,14 +147,15 @@ class HarvestVectorEnv(VectorEnv):
             raise InputError("step", "no mission is in progress", "reset() first")
         checked = checked_actions(actions, (self.num_envs,))
         outcome = self._stepper.step(checked.reshape(self.state.uavs.shape))
-        info: dict[str, Any] = {name: outcome.ravel()[name].copy() for name in _INFOS}
+        rows = outcome.ravel()
+        info: dict[str, Any] = {name: rows[name].copy() for name in _INFOS}
         terminated, truncated = np.zeros((2, self.num_envs), np.bool_)
         shown = outcome["acted"]
         if np.count_nonzero(self.state.missions["active"]) < self.missions:
             terminated, truncated, shown = self._turn(outcome, info)
         observations = self._observe(shown)
         info |= self._present()
-        return observations, outcome["reward"].ravel(), terminated, truncated, info
+        return observations, rows["reward"].copy(), terminated, truncated, info
 
     def action_masks(self) -> np.ndarray:
         """The (R, 5) mask of the actions that are allowed in the next step."""

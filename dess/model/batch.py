@@ -207,20 +207,11 @@ def _next_mission(b, job_of, queue, source, state):
 @kernel
 def _advance(job_of, queue, source, state, world, scratch, ways, records):
     """Advance every mission by one slot; a mission that ends is recorded and replaced."""
-    nodes, mean_snr, order, means, chart = world
-    batches, search = scratch
-    missions, uavs, residual, sensors, teeth = state
-    arrivals = np.empty(len(nodes))
-    for b in range(len(missions)):
+    for b in range(len(job_of)):
         if job_of[b] < 0:
             continue
-        mission, team, data = missions[b], uavs[b], residual[b]
-        rules.run_slot(
-            mission, team, data, sensors[b], teeth[b], arrivals,
-            nodes, mean_snr, order, means, chart, batches, search,
-        )  # fmt: skip
-        if is_over(mission):
-            job = job_of[b]
-            write_record(mission, team, data, sensors[b], teeth[b], ways, records, job)
+        rules.run_slot(state, b, world, scratch)
+        if is_over(state.missions[b]):
+            write_record(state, b, ways, records, job_of[b])
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

@@ -163,7 +163,7 @@ class World(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Working memory of the search for the best node.
+    """Working memory of a slot.
 
     Attributes:
         batches: (I, C) ``BATCH`` records: the nodes tried for each UAV, eight at a time.
@@ -171,10 +171,12 @@ class Scratch(NamedTuple):
             the row of the UAV's step, and the number of nodes in a batch, which is always eight.
             The compiled code reads this last number at run time, because the compiler does not
             vectorise a loop that it knows to be so short.
+        arrivals: (K,) the new data of the slot [data units].
     """
 
     batches: np.ndarray
     search: np.ndarray
+    arrivals: np.ndarray
 
 
 DRAWN, RANK, ROW, WIDTH = range(4)  # columns of Scratch.search
@@ -184,7 +186,7 @@ def empty_scratch(uavs: int, nodes: int) -> Scratch:
     """Working memory for missions of at most that many UAVs and nodes."""
     search = np.zeros((uavs, 4), np.int64)
     search[:, WIDTH] = _BATCH
-    return Scratch(np.zeros((uavs, -(-nodes // _BATCH)), BATCH), search)
+    return Scratch(np.zeros((uavs, -(-nodes // _BATCH)), BATCH), search, np.zeros(nodes))
 
 
 def world_of(scenario: ScenarioSpace) -> World:
@@ -270,9 +272,9 @@ def _is_before(high, k, other):
 
 
 @inlined
-def open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search):
+def open_slot(mission, uavs, nodes, mean_snr, order, means, zones, search):
     """Begin a mission slot: find the rows of the UAVs' steps, and fill them where they are new."""
-    rows, columns = chart.zones.shape
+    rows, columns = zones.shape
     for i in range(mission.uavs):
         u = uavs[i]
         if u.active:

@@ -55,7 +55,6 @@ from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
 from dess.model.ways import Ways
 from dess.physics.charging import may_change_order, queue_key
-from dess.physics.chart import Chart
 from dess.physics.failures import strike_nodes, strike_pads, strike_uavs
 from dess.physics.landing import is_over
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
@@ -200,7 +199,6 @@ class Mission:
         self.sensors = self.state.sensors[0]
         self.fleet = range(int(self.mission["uavs"]))
         self.wants_pad_bits = 0  # bit i tells whether UAV i wants a pad in this slot
-        self.arrivals = np.zeros(len(scenario.nodes))
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.listener = LogWriter(self.state, self.world.nodes) if events else Listener()
         self.further = processes
@@ -291,7 +289,8 @@ class Mission:
         This also tells which UAVs want a pad in this slot.
         """
         decide(self.policies, self.state, self.shown_world, self.ways)
-        self.wants_pad_bits = _resolve(self.state.missions, self.state.uavs, *self.world.chart)
+        zones = self.world.chart.zones
+        self.wants_pad_bits = _resolve(self.state.missions, self.state.uavs, zones)
 
     def give_turns(self) -> ProcessGenerator:
         """Let each UAV take its turn in this slot, one after the other; pads are granted.
@@ -329,7 +328,7 @@ class Mission:
         """Charge and discharge the batteries for this slot, and prepare the search of the radio."""
         _update_batteries(
             self.state.missions, self.state.uavs, self.world.nodes, self.world.mean_snr,
-            self.world.order, self.world.means, *self.world.chart, self.scratch.search,
+            self.world.order, self.world.means, self.world.chart.zones, self.scratch.search,
         )  # fmt: skip
         self.listener.note_moves()
 
@@ -339,7 +338,7 @@ class Mission:
         The slot that the state has is the next one from here on.
         """
         _settle(self.state.missions, self.state.uavs)
-        self.listener.note_close(self.arrivals)
+        self.listener.note_close(self.scratch.arrivals)
 
     # --- the UAVs ---
 
@@ -421,7 +420,8 @@ class Mission:
     def run_radio(self) -> ProcessGenerator:
         """Let all UAVs in the air collect data in the communication slots 1..m of every slot."""
         m = int(self.mission["communication_slots"])
-        arrays = (*self.state, self.world.order, self.world.means, *self.scratch)
+        batches, search, _ = self.scratch
+        arrays = (*self.state, self.world.order, self.world.means, batches, search)
         while True:
             yield self.radio_starts.wait()
             slot = int(self.mission["slot"])
@@ -439,7 +439,7 @@ class Mission:
         _, _, residual, sensors, _ = self.state
         while True:
             yield self.data_are_due.wait()
-            _arrive(self.state.missions, residual, sensors, self.arrivals, *self.scratch)
+            _arrive(self.state.missions, residual, sensors, self.scratch)
 
     def bring_packets(self, packets: Packets) -> ProcessGenerator:
         """Let packets arrive, each at its own time."""
@@ -521,12 +521,11 @@ def _is_over(missions):
 
 
 @kernel
-def _resolve(missions, uavs, zones, parking, sizes, nearest, ways, rows):
+def _resolve(missions, uavs, zones):
     """Resolve the moves; bit i of the result tells whether UAV i wants a pad (64 UAVs at most)."""
     mission = missions[0]
     fleet = uavs[0]
-    chart = Chart(zones, parking, sizes, nearest, ways, rows)
-    rules.resolve(mission, fleet, chart)
+    rules.resolve(mission, fleet, zones)
     wants_pad = 0
     for i in range(mission.uavs):
         wants_pad |= np.int64(rules.may_charge(mission, fleet[i])) << i
@@ -539,18 +538,14 @@ def _start_charging(missions, uavs, i):
 
 
 @kernel
-def _update_batteries(
-    missions, uavs, nodes, mean_snr, order, means,
-    zones, parking, sizes, nearest, ways, rows, search,
-):  # fmt: skip
+def _update_batteries(missions, uavs, nodes, mean_snr, order, means, zones, search):
     """Update the batteries, and open the slot for the search of the best nodes.
 
     The slot is opened here, since the functions of communication slots, which are called more
     often, then take fewer arguments.
     """
-    chart = Chart(zones, parking, sizes, nearest, ways, rows)
     rules.spend(missions[0], uavs[0])
-    channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, chart, search)
+    channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, zones, search)
 
 
 @kernel
@@ -564,8 +559,8 @@ def _communicate(
 
 
 @kernel
-def _arrive(missions, residual, sensors, arrivals, batches, search):
-    rules.arrive(missions[0], residual[0], sensors[0], arrivals, batches, search)
+def _arrive(missions, residual, sensors, scratch):
+    rules.arrive(missions[0], residual[0], sensors[0], scratch)
 
 
 @kernel

@@ -135,16 +135,13 @@ def write_records(places, state, ways, records):
     ``ways`` are the tables ``Ways.home``.
     """
     for row in range(len(places)):
-        b = places[row]
-        write_record(
-            state.missions[b], state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
-            ways, records, row,
-        )  # fmt: skip
+        write_record(state, places[row], ways, records, row)
 
 
 @inlined
-def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
-    """Write the record of a mission into a row of ``Records``."""
+def write_record(state, b, ways, records, row):
+    """Write the record of mission ``b`` of a state into a row of ``Records``."""
+    mission, uavs, residual = state.missions[b], state.uavs[b], state.residual[b]
     record, uav_records = records.missions[row], records.uavs[row]
     record.seed = mission.seed
     record.replication = mission.replication
@@ -184,7 +181,8 @@ def write_record(mission, uavs, residual, sensors, teeth, ways, records, row):
     # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
     record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
-    _write_operations(mission, uavs, sensors, teeth, records.operations, row)
+    sensors = state.sensors[b]
+    _write_operations(mission, uavs, sensors, state.teeth[b], records.operations, row)
     _write_nodes(mission, residual, sensors, records.nodes, row)
 
 

@@ -2,9 +2,10 @@
 
 The module holds compiled functions that change the arrays of one mission in place. Both engines and
 the environments call these functions, which use no random generator object and no global state.
-The batch engine runs a slot in the order of Section III-C (see ``advance``):
+``run_slot`` runs a slot in the order of Section III-C, and the SimPy engine has a process for each
+part of it:
 
-    resolve(mission, uavs, chart)        # moves, safety controller
+    resolve(mission, uavs, zones)        # moves, safety controller
     grant_pads(mission, uavs)            # the SimPy engine has a PriorityResource instead
     spend(mission, uavs)                 # energy
     channel.open_slot(mission, uavs, ...)
@@ -133,7 +134,7 @@ def _update_latch(mission, u):
 
 
 @inlined
-def resolve(mission, uavs, chart):
+def resolve(mission, uavs, zones):
     """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at the same time.
 
     A move off the grid or into a no-fly cell becomes Hover, and so does a move into a cell that
@@ -156,7 +157,7 @@ def resolve(mission, uavs, chart):
         u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
         u.x += STEP_X[u.action]
         u.y += STEP_Y[u.action]
-        if not is_open(chart, u.x, u.y):
+        if not is_open(zones, u.x, u.y):
             _cancel(u)
             u.overruled_by = -1
     changed = count > 1
@@ -178,7 +179,7 @@ def resolve(mission, uavs, chart):
                 changed = True
     for i in range(count):
         if uavs[i].active:
-            uavs[i].zone = chart.zones[uavs[i].y, uavs[i].x]
+            uavs[i].zone = zones[uavs[i].y, uavs[i].x]
 
 
 @inlined
@@ -211,11 +212,11 @@ def may_act(u):
 
 
 @inlined
-def legal_moves(chart, u):
+def legal_moves(zones, u):
     """The actions that keep a UAV on the grid and out of no-fly cells, a bit for each."""
     legal = 0
     for action in range(5):
-        if is_open(chart, u.x + STEP_X[action], u.y + STEP_Y[action]):
+        if is_open(zones, u.x + STEP_X[action], u.y + STEP_Y[action]):
             legal |= 1 << action
     return legal
 
@@ -359,13 +360,13 @@ def _leaves_crumb(mission, data, amount):
 
 @kernel
 def _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search):
-    """Run all communication slots. Within ``advance``, registers would be short."""
+    """Run all communication slots. Within ``run_slot``, registers would be short."""
     for n in range(1, mission.communication_slots + 1):
         communicate(mission, uavs, residual, sensors, teeth, order, means, batches, search, n)
 
 
 @kernel
-def arrive(mission, residual, sensors, arrivals, batches, search):
+def arrive(mission, residual, sensors, scratch):
     """Add the new data of one slot (eq. 12): a Poisson number of messages per node.
 
     A message is a data unit, unless the scenario has another size.
@@ -374,14 +375,14 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
         mission: ``MISSION`` record.
         residual: (K,) residual data [data units], increased.
         sensors: (K,) ``SENSOR`` records.
-        arrivals: (K,) new data of the slot [data units], overwritten.
-        batches, search: As in ``Scratch``; memory for the draws.
+        scratch: ``Scratch``; its ``arrivals`` are overwritten.
     """
     if mission.continuous != 0:  # then they are events of their own (dess.model.packets)
         return
     rate = mission.arrival_rate
     probability_of_none = exp(-rate)
-    batch = batches[0, 0]
+    arrivals = scratch.arrivals
+    batch = scratch.batches[0, 0]
     for k in range(mission.nodes):
         block = k // 4 % len(batch.node)
         if k % 4 == 0 and block == 0:
@@ -389,7 +390,7 @@ def arrive(mission, residual, sensors, arrivals, batches, search):
                 batch.node[ahead] = k // 4 + ahead
             streams.blocks(
                 mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot,
-                batch.node, batch.words, search[0, channel.WIDTH],
+                batch.node, batch.words, scratch.search[0, channel.WIDTH],
             )  # fmt: skip
         word = batch.words[k % 4, block]
         arrivals[k] = 0.0
@@ -480,47 +481,47 @@ def data_left(mission, residual):
 
 
 @inlined
-def advance(
-    mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, chart, batches, search,
-):  # fmt: skip
-    """Run one mission slot with the actions in ``uavs``, in the order of Section III-C."""
-    resolve(mission, uavs, chart)
+def run_slot(state, b, world, scratch):
+    """Run a slot of mission ``b`` with the actions in its UAVs, in the order of Section III-C.
+
+    After its last UAV has ended, the slot has no UAVs.
+
+    Args:
+        state: ``State``.
+        b: The place of the mission in it.
+        world: ``World``.
+        scratch: ``Scratch``.
+    """
+    # The functions that are not inlined take few arrays: each costs time.
+    mission, uavs, residual = state.missions[b], state.uavs[b], state.residual[b]
+    sensors, teeth = state.sensors[b], state.teeth[b]
+    nodes, mean_snr, order, means, chart = world
+    batches, search, _ = scratch
+    if advance_without_uavs(mission, uavs, residual, sensors, scratch):
+        return
+    resolve(mission, uavs, chart.zones)
     grant_pads(mission, uavs)
     spend(mission, uavs)
-    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
+    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart.zones, search)
     _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search)
-    arrive(mission, residual, sensors, arrivals, batches, search)
+    arrive(mission, residual, sensors, scratch)
     settle(mission, uavs)
     strike_if_on(mission, uavs, residual, sensors, LOST)
 
 
-@inlined
-def run_slot(
-    mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, chart, batches, search,
-):  # fmt: skip
-    """Run one mission slot with the actions in ``uavs``, or without any UAV after the last one."""
-    if not advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
-        advance(
-            mission, uavs, residual, sensors, teeth, arrivals,
-            nodes, mean_snr, order, means, chart, batches, search,
-        )  # fmt: skip
-
-
 @for_sections
-def advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
+def advance_without_uavs(mission, uavs, residual, sensors, scratch):
     """Run a slot of a mission that waits for its horizon; return whether it does (``is_over``)."""
     if mission.active > 0 or is_over(mission):
         return False
-    _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search)
+    _advance_without_uavs(mission, uavs, residual, sensors, scratch)
     return True
 
 
 @shared_kernel
-def _advance_without_uavs(mission, uavs, residual, sensors, arrivals, batches, search):
+def _advance_without_uavs(mission, uavs, residual, sensors, scratch):
     """New data arrive, and pads and nodes fail and are repaired; nothing else happens."""
     mission.slot_collected = 0.0
-    arrive(mission, residual, sensors, arrivals, batches, search)
+    arrive(mission, residual, sensors, scratch)
     mission.slot += 1
     strike_if_on(mission, uavs, residual, sensors, LOST)

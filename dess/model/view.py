@@ -117,11 +117,12 @@ class View:
     @cached_property
     def legal(self) -> np.ndarray:
         """(R, 5) mask of the legal actions: Hover, and the moves that stay on the open grid."""
-        return legal_actions(self.state.uavs, self.world.chart, self.mission, self.uav)
+        zones = self.world.chart.zones
+        return legal_actions(self.state.uavs, zones, self.mission, self.uav)
 
 
 @kernel
-def legal_actions(uavs, chart, rows_mission, rows_uav):
+def legal_actions(uavs, zones, rows_mission, rows_uav):
     """(R, 5) mask of the actions that stay on the grid and out of no-fly cells.
 
     Only Hover is allowed for a UAV that is not asked for an action, and where its index is -1.
@@ -131,7 +132,7 @@ def legal_actions(uavs, chart, rows_mission, rows_uav):
         b, i = rows_mission[row], rows_uav[row]
         moves = 1 << HOVER
         if i >= 0 and may_act(uavs[b, i]):
-            moves = legal_moves(chart, uavs[b, i])
+            moves = legal_moves(zones, uavs[b, i])
         for action in range(5):
             legal[row, action] = moves >> action & 1
     return legal

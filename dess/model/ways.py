@@ -13,6 +13,7 @@ slot takes one percent, the return guard needs no table: distances tell the same
 """
 
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,9 @@ class Ways:
             chart: Their chart.
         """
         self._missions, self._chart = missions, chart
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Ways, (self._missions, self._chart)  # tables of a copy are read-only as well
 
     @cached_property
     def reach(self) -> np.ndarray | None:

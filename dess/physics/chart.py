@@ -254,10 +254,10 @@ def _at_least(ways, rows, width, x, y, to_x, to_y):
 
 
 @inlined
-def is_open(chart, x, y):
-    """Whether cell ``x, y`` is on the grid, and no no-fly cell."""
-    height, width = chart.zones.shape
-    return 0 <= x < width and 0 <= y < height and chart.zones[y, x] != NO_FLY
+def is_open(zones, x, y):
+    """Whether cell ``x, y`` is on the grid, and no no-fly cell, by ``Chart.zones``."""
+    height, width = zones.shape
+    return 0 <= x < width and 0 <= y < height and zones[y, x] != NO_FLY
 
 
 @inlined

@@ -501,7 +501,9 @@ def _is_nearer(chart, v, x, y, action):
     after_x = v.x + STEP_X[action]
     after_y = v.y + STEP_Y[action]
     before = distance(chart, v.x, v.y, x, y)
-    return is_open(chart, after_x, after_y) and distance(chart, after_x, after_y, x, y) < before
+    if not is_open(chart.zones, after_x, after_y):
+        return False
+    return distance(chart, after_x, after_y, x, y) < before
 
 
 @inlined

@@ -203,7 +203,7 @@ def _edit_plan(mission, uavs, nodes, chart, flight, plan, words):
         action = _pick_number(words[2], 4)
         x = w.x + STEP_X[action]
         y = w.y + STEP_Y[action]
-        if not is_open(chart, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
+        if not is_open(chart.zones, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
         w.x = x
         w.y = y

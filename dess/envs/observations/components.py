@@ -184,7 +184,7 @@ def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
         for action in range(HOVER):
             x = u.x + STEP_X[action]
             y = u.y + STEP_Y[action]
-            if is_open(chart, x, y):
+            if is_open(chart.zones, x, y):
                 extra = _surcharge(mission, u, action, x, y)
                 out[at + action] = mission.flight_cost * extra / 100.0
         at += HOVER

@@ -20,6 +20,7 @@ from dess.envs.observations.vector import Vector
 from dess.model.channel import world_of
 from dess.model.state import State, constants_of
 from dess.model.view import legal_actions
+from dess.model.ways import Ways
 from dess.scenario.scenario import ScenarioSpace
 
 # The encoders that learners use, by the kind of observation, and the names of their arrays.
@@ -69,6 +70,7 @@ class Observer:
         self.kind = kind
         self.guarded = guarded
         self._chart = scenario.chart
+        self._ways = Ways(constants_of(scenario), self._chart)
         self._encoder: Any = Components(scenario) if kind == "state" else encoder_of(kind, scenario)
         boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]
         if kind == "state":
@@ -93,9 +95,9 @@ class Observer:
             booleans. Only Hover is allowed for a UAV that charges or is not active, and for -1.
         """
         if self.kind == "state" and not self.guarded:
-            allowed = legal_actions(state.uavs, self._chart, missions, uavs)
+            allowed = legal_actions(state.uavs, self._chart.zones, missions, uavs)
             return self._encoder.encode(state, missions, uavs)[0], allowed
-        states = compact_states(state, self._chart, self.guarded)
+        states = compact_states(state, self._chart, self.guarded, self._ways)
         parts = self._encoder.encode(state if self.kind == "state" else states, missions, uavs)
         return self._named(parts), masks(states, missions, uavs)
 

@@ -216,7 +216,7 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
         for action in range(5):
             to_x = x + STEP_X[action]
             to_y = y + STEP_Y[action]
-            opens[action] = is_open(sea.chart, to_x, to_y)
+            opens[action] = is_open(sea.chart.zones, to_x, to_y)
             places[action] = to_y * columns + to_x if opens[action] else y * columns + x
         total = np.float32(0.0)
         for k in range(count):

@@ -117,7 +117,7 @@ def compact_states(
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     reach = (ways or Ways(state.missions, chart)).reach
     rows = _active_rows(state.missions, state.uavs)
-    guidance = guide(state.missions, state.uavs, state.residual, *rows, *chart, reach, True)
+    guidance = guide(state.missions, state.uavs, state.residual, *rows, chart, reach, True)
     _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *guidance, *states)
     return states
 
@@ -164,7 +164,7 @@ def _fill(
             battery = _observed_battery(battery, cells * u.slots_per_cell)
             row[HOME] = min(battery, _MOST)
             if may_act(u):
-                row[MASK] = safe[guided] if guarded else legal_moves(chart, u)
+                row[MASK] = safe[guided] if guarded else legal_moves(chart.zones, u)
             guided += 1
 
 

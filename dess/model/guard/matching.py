@@ -188,7 +188,7 @@ def _can_be_entered(chart, closed, x, y):
     for action in range(4):
         from_x, from_y = x + STEP_X[action], y + STEP_Y[action]
         number = from_y * chart.zones.shape[1] + from_x
-        if is_open(chart, from_x, from_y) and not (closed == number).any():
+        if is_open(chart.zones, from_x, from_y) and not (closed == number).any():
             return True
     return False
 

@@ -28,7 +28,7 @@ from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
 from dess.model.ways import is_calm
 from dess.physics.charging import longest_charge
-from dess.physics.chart import Chart, distance, in_zone, is_open
+from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.energy import PERCENT, dearest_slot, has_costs, move_cost, slot_cost, waiting_slot
 from dess.physics.landing import lands
 
@@ -184,7 +184,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
         remains = action == HOVER and parked
         contested = 0 if remains else contest(levels, action)
         gives_way = charge and home.gives_way == 1 and action == HOVER
-        if not is_open(chart, x, y) or contested == 3 or gives_way:
+        if not is_open(chart.zones, x, y) or contested == 3 or gives_way:
             continue
         late = 0
         if charge:
@@ -348,10 +348,7 @@ class Guidance(NamedTuple):
 
 
 @kernel
-def guide(
-    missions, uavs, residual, rows_mission, rows_uav,
-    zones, parking, sizes, nearest, ways, rows, reach, find_all,
-):  # fmt: skip
+def guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, find_all):
     """The ``Guidance`` for UAVs.
 
     Call it from Python: a compiled function that called it would be compiled with the whole guard,
@@ -363,13 +360,11 @@ def guide(
         residual: (B, K) data of the nodes [data units].
         rows_mission: (R,) index of each row's mission, in ascending order.
         rows_uav: (R,) index of each row's UAV in its mission.
-        zones, parking, sizes, nearest, ways, rows: Those of the ``Chart``, which takes longer as
-            one argument.
+        chart: ``Chart``.
         reach: ``Ways.reach``.
         find_all: Whether to find the parking cells of UAVs that need not charge, too; without, such
             a UAV has its present cell.
     """
-    chart = Chart(zones, parking, sizes, nearest, ways, rows)
     charges = np.empty(len(rows_mission), np.bool_)
     homes = np.empty(len(rows_mission), HOME)
     safe = np.empty(len(rows_mission), np.int64)
@@ -418,6 +413,6 @@ def guard(view: View) -> np.ndarray:
     """
     state, chart, reach = view.state, view.world.chart, view.ways.reach
     guidance = guide(
-        state.missions, state.uavs, state.residual, view.mission, view.uav, *chart, reach, False
+        state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach, False
     )
     return (guidance.safe[:, None] >> np.arange(5) & 1).astype(bool)

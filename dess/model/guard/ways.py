@@ -189,7 +189,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
         for action in range(4):
             next_x = cell % width + STEP_X[action]
             next_y = cell // width + STEP_Y[action]
-            if not is_open(chart, next_x, next_y):
+            if not is_open(chart.zones, next_x, next_y):
                 continue
             to = next_y * width + next_x
             cost = spent[cell] + move_cost(mission, slots, action, next_x, next_y)

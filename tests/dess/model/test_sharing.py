@@ -6,11 +6,14 @@ that differ in it would share a table that is right for one of them.
 
 import sys
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import Any
 
 from dess import policies
 from dess.model.batch import simulate_batch
 from dess.model.reach import reach_of_nodes
+from dess.model.state import constants_of
+from dess.model.ways import Ways
 from dess.policies.planner.policy import Budget, Planner
 from dess.scenario import fields
 from dess.scenario.scenario import ScenarioSpace
@@ -166,3 +169,11 @@ def test_reach_is_that_of_empty_caches():
     for space, reach in zip(spaces, warm, strict=True):
         _forget_all()
         assert reach_of_nodes(space) == reach
+
+
+def test_the_tables_of_a_copy_cannot_be_written_to_either():
+    """To the compiler, arrays that can be written to have another type."""
+    space = ScenarioSpace.of(BASE, wind={"strength": 0.5})
+    ways = Ways(constants_of(space), space.chart)
+    assert ways.home.any()
+    assert not deepcopy(ways).home.flags.writeable
