@@ -22,8 +22,7 @@ BARS = (
     "failures."
 )
 CHECKED = f"The check of the selected settings: means with {INTERVALS}"
-MOST_PRINTED = 20  # the largest number of rows of a table that the terminal prints
-MOST_ROWS = 25  # the largest number of rows of a table on a page; its data have all rows
+MOST_ROWS = 25  # the largest number of rows of a table; its data have all rows
 WIDER = 1.5  # times as wide as without the allowance for failures: what is explained in words
 _HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
 _HEADS |= {column: metric.name for column, metric in metric_group("home").items()}

@@ -68,6 +68,10 @@ _VERDICTS = {
 }
 _MOST_NAMED = 2  # the largest number of changed fields that a headline names
 SIDES = ("baseline", "variation")
+_MARKED = (
+    "▲ higher in the variation, ▼ lower, △ and ▽ the same in what was seen, where a rare failure "
+    "is not ruled out, ≈ inconclusive"
+)
 
 # Further quantities per mission, in addition to the paper's metrics.
 MEASURES = {
@@ -374,11 +378,12 @@ class Variation:
         before, after = (table["Field"] + " " + table[side] for side in ("Baseline", "Variation"))
         return [*before], [*after]
 
-    def measures(self, policy: str) -> pd.DataFrame:
-        """The rows of the table of a policy, as a table to print."""
+    def measures_table(self, policy: str) -> Table:
+        """The means of a policy on both sides, and their differences."""
         table = self.table()
+        rows = table[table["policy"] == policy]
         lines = []
-        for row in table[table["policy"] == policy].itertuples():
+        for row in rows.itertuples():
             in_percent = metric_of(row.metric).in_percent
             if in_percent:
                 write, unit = (numbers.format_percent, " points")
@@ -390,14 +395,9 @@ class Variation:
             if row.n:
                 difference = f"{MARKS[judge_difference(row)]} {format_change(row)}{unit}"
             lines.append([name, *sides, difference])
-        heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
-        return pd.DataFrame(lines, columns=heads)
-
-    def measures_table(self, policy: str) -> Table:
-        """The rows of the table of a policy, under its name, as the terminal prints them."""
-        table = self.table()
-        cells = self.measures(policy).rename(columns={"Mean per mission": policy})
-        return Table(cells, "", table[table["policy"] == policy])
+        heads = [policy, "Baseline", "Variation", "Paired difference"]
+        caption = f"Means per mission with {policy}, n = {rows['n'].max():,}; {_MARKED}"
+        return Table(pd.DataFrame(lines, columns=heads), caption, rows)
 
     def pairing(self) -> pd.DataFrame:
         """How much common random numbers narrow the intervals, as a table to print."""

@@ -69,8 +69,8 @@ class Answer(ABC):
         """The numbers of what was compared, a row for each."""
 
     @abstractmethod
-    def brief_tables(self) -> list[Table]:
-        """The answer in few tables, as the terminal prints them, with what is said below each."""
+    def shown_tables(self) -> list[Table]:
+        """The answer in few tables, as pages and the terminal show them."""
 
     @abstractmethod
     def plot(self) -> "Figure":
@@ -180,7 +180,7 @@ class SweepAnswer(Answer):
         """
         return self.table(metric).drop_duplicates("policy", ignore_index=True)
 
-    def brief_tables(self) -> list[Table]:
+    def shown_tables(self) -> list[Table]:
         """The first settings of the ranking."""
         return [ranked_table(self.results, self.table(), self._ranking_metric)]
 
@@ -257,11 +257,11 @@ class FleetAnswer(SweepAnswer):
         """The settings as ``table``, and the ``fleets``."""
         return {**super().tables(), "fleets": self.fleets()}
 
-    def brief_tables(self) -> list[Table]:
+    def shown_tables(self) -> list[Table]:
         """The fleets by cost, and what a change of the cheapest brings."""
-        tables = [fleet_tables.brief_fleet_table(self.results, self.metric or SUCCESS)]
+        tables = [fleet_tables.fleet_table(self.results, self.metric or SUCCESS)]
         if around.is_known(self.results):
-            tables.append(around.table_around(self.results)._replace(caption=""))
+            tables.append(around.table_around(self.results))
         return tables
 
     @property
@@ -297,7 +297,7 @@ class VariationAnswer(Answer):
         """The differences, a row per policy and metric, as ``answers.variation.compare_sides``."""
         return self.variation.table()
 
-    def brief_tables(self) -> list[Table]:
+    def shown_tables(self) -> list[Table]:
         """What was measured on both sides, a table for each policy."""
         return [self.variation.measures_table(policy) for policy in self.results.policies]
 

@@ -218,17 +218,15 @@ def _print_answer(
     asked: str,
 ) -> None:
     """Print an answer, and write its page, which takes longer; or print all of it as JSON."""
-    from dess.reports.cli.tables import print_cells, print_facts
+    from dess.reports.cli.tables import print_facts, print_table_with_caption
 
     facts = answer.facts()
     assumed = answer.assumptions()
     if not as_json:
         console.print_text(answer.headline())
         print_facts(facts)
-        for table in answer.brief_tables():
-            print_cells(table.cells)
-            if table.caption:
-                console.print_text(table.caption)
+        for table in answer.shown_tables():
+            print_table_with_caption(table)
         if assumed:
             console.print_text("What is assumed:")
             print_facts(assumed)

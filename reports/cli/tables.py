@@ -26,14 +26,19 @@ from dess.analysis.metrics import (
     metric_group,
     metric_of,
 )
+from dess.analysis.names import field_named
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import MARKS, NOT_RULED_OUT, SEEN_BELOW, SEEN_WORSE, WORSE
 from dess.analysis.tables import Table, comparison_cells, format_counts
 from dess.analysis.tables import means_table as means_table
 from dess.reports.cli import console
+from dess.scenario.fields import fields_of
+from dess.scenario.scenario import ScenarioSpace
 
+# Heads as the options of commands have them: metrics, and fields of the scenario.
 _SHORT = {name: metric_of(metric).head for metric, name in METRICS.items()}
+_SHORT |= {field_named(field).name: field for field in fields_of(ScenarioSpace)}
 _QUANTILES = (0.05, 0.5, 0.95)
 _FACT_HEADS = ("", "Found", "Required", "Guaranteed")
 _LABEL_WIDTH = 28  # of the facts of an answer [characters]

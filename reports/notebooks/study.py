@@ -47,9 +47,9 @@ from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import (
     allowance_for_setting,
     best_of_policies_table,
-    best_settings_table,
     missions_at_best,
     rank_settings,
+    ranked_table,
 )
 from dess.analysis.answers.settings.sobol import (
     draw_indices,
@@ -147,16 +147,16 @@ show_parts(
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
 #
-# A *setting* is a policy at a design point. It *may be the best* if no other one is significantly
-# better in what was seen. With a probability of 95 %, the truly best is among these and those that
-# are only *not in what was seen*, where a rare failure is not ruled out (paired t tests on common
-# replications, corrected for the number of settings and, after a search, of its looks). So a
-# setting of few missions may be the best although its mean is much lower.
+# A *setting* is a policy at a design point. It *may be the best* (≈) if no other one is
+# significantly better in what was seen. With a probability of 95 %, the truly best is among these
+# and those that are only *not in what was seen* (▽), where a rare failure is not ruled out (paired
+# t tests on common replications, corrected for the number of settings and, after a search, of its
+# looks). So a setting of few missions may be the best although its mean is much lower.
 # The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
 show_parts(
-    best_settings_table(study, ranked, by),
+    ranked_table(study, ranked, by),
     best_of_policies_table(study, by),
     write_markdown("{why}", why=allowance_for_setting(study, ranked, by)),
 )

@@ -27,10 +27,7 @@ yes = False  # True if the missions may take more than an hour
 # %%
 from dess.analysis import sweep
 from dess.analysis.answers.settings.points import varied_values
-from dess.analysis.answers.settings.ranking import (
-    best_of_policies_table,
-    best_settings_table,
-)
+from dess.analysis.answers.settings.ranking import best_of_policies_table
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.reports.pages import study
 from dess.reports.pages.markdown import command_block, write_markdown
@@ -40,7 +37,6 @@ from dess.reports.pages.provenance import provenance_table
 # %%
 answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
 
-ranked = answer.table()
 of_fields = " and ".join([*varied_values(answer.results)][:2])
 each = f"n = {missions:,} missions per setting"
 drawn = {
@@ -74,7 +70,7 @@ make_gallery([drawn[SUCCESS], drawn[RATIO]])
 # `charging.plan_waits` is false.
 
 # %%
-show_parts(best_settings_table(answer.results, ranked, PRODUCT))
+show_parts(*answer.shown_tables())
 
 # %% [markdown]
 # ## Tables

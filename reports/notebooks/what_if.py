@@ -36,7 +36,7 @@ from dess.analysis.metrics import metric_of
 from dess.reports.pages import study as page
 from dess.reports.pages.markdown import code_block, command_block, escape_sentences, write_markdown
 from dess.reports.pages.panel import make_panel
-from dess.reports.pages.parts import lead_figure, make_answer, make_facts, make_gallery
+from dess.reports.pages.parts import lead_figure, make_answer, make_facts, make_gallery, show_parts
 from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.tables import make_table
 
@@ -120,12 +120,7 @@ make_table(
 # ## Tables
 
 # %%
-for policy in found.policies:
-    marks = (
-        "▲ higher in the variation, ▼ lower, △ and ▽ the same in what was seen, where a rare "
-        "failure is not ruled out, ≈ inconclusive"
-    )
-    display(make_table(variation.measures(policy), f"{policy}, n = {missions:,}; {marks}"))
+show_parts(*asked.shown_tables())
 
 # %% [markdown]
 # ## Change the question

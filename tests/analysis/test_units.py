@@ -108,7 +108,7 @@ def test_a_search_answers_in_costs_of_a_year_and_of_a_gb(searched):
     assert found["cost of data"] == f"{best.cost / gb / 1000:,.2f} EUR per MB collected"
     assert found["price when bought"] == f"{2 * parts['purchase']:,.0f} EUR"
     assert "over 2 years at 0 % interest; 200 missions a year" in found["paid for"]
-    assert "Cost [EUR a year]" in answer.brief_tables()[0].cells
+    assert "Cost [EUR a year]" in answer.shown_tables()[0].cells
     assert "--price years=2" in again.command
 
 
@@ -168,7 +168,7 @@ def test_lengths_and_data_of_a_question_are_in_units(tmp_path):
     answer = VariationAnswer(question.ask(), question)
     table = answer.table().set_index("metric")
     assert table.loc["slots_h", ["before", "after"]].tolist() == pytest.approx([2, 2], rel=0.02)
-    rows = answer.variation.measures("greedy")["Mean per mission"].tolist()
+    rows = answer.variation.measures_table("greedy").cells["greedy"].tolist()
     assert {"Length of the mission [h]", "Data collected [MB]"} <= {*rows}
     assert not [row for row in rows if "lots" in row]
 

@@ -26,7 +26,7 @@ from dess.analysis.answers.fleet.verdicts import (
 from dess.analysis.answers.settings.points import has_conditions, intervals_in_words
 from dess.analysis.metrics import COST, SUCCESS
 from dess.analysis.results.tables import Results
-from dess.analysis.tables import INTERVALS, MOST_PRINTED, MOST_ROWS, Table, format_counts
+from dess.analysis.tables import INTERVALS, MOST_ROWS, Table, format_counts
 
 
 def fleet_rows(results: Results) -> pd.DataFrame:
@@ -107,22 +107,6 @@ def fleet_table(results: Results, further: str = SUCCESS) -> Table:
         )
     caption += f"{VERDICTS_EXPLAINED.capitalize()}. Means with {intervals_in_words(results)}"
     return Table(fleet_cells(results, top, further), caption, rows)
-
-
-def brief_fleet_table(results: Results, further: str = SUCCESS) -> Table:
-    """The fleets by cost, with the answer marked, as the terminal prints them.
-
-    Args:
-        results: The study.
-        further: A metric that is shown beside those of the requirements.
-    """
-    rows = fleet_rows(results)
-    pairs = f"{len(rows):,} pairs of a fleet and a policy"
-    if len(rows) > MOST_PRINTED:
-        pairs += f", {MOST_PRINTED} of them shown"
-    required = f"required: {requirements_in_words(requirements_of(results))}"
-    caption = f"{pairs}, the cheapest first; {required}; {VERDICTS_EXPLAINED}"
-    return Table(fleet_cells(results, shown_rows(rows, MOST_PRINTED), further), caption, rows)
 
 
 def condition_table(results: Results) -> Table:

@@ -42,7 +42,6 @@ from dess.analysis.metrics import (
     metrics_in,
     ranking_column,
 )
-from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
 from dess.analysis.stats.intervals import column_intervals, mean_interval
@@ -56,7 +55,6 @@ from dess.analysis.stats.verdict import (
 )
 from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import (
-    MOST_PRINTED,
     MOST_ROWS,
     WIDER,
     Table,
@@ -290,54 +288,29 @@ def allowance_for_setting(results: Results, rows: pd.DataFrame, metric: str) -> 
     return allowance_sentence(f"the {measure.within} of {best}", alone, allowing, int(first["n"]))
 
 
-def best_settings_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
-    """The best settings.
-
-    Args:
-        results: The study.
-        rows: Its ``rank_settings``.
-        metric: The metric that ranks them.
-    """
-    top = rows.head(MOST_ROWS)
-    cells = _ranking_cells(results, top, metric)
-    cells.insert(0, "Rank", top["rank"])
-    may_be = top["tied"].map(numbers.format_truth)
-    may_be = np.where(top["standing"] == SEEN_WORSE, "not in what was seen", may_be)
-    cells.insert(1, "May be the best", may_be)
-    caption = (
-        f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: "
-        f"means with {intervals_in_words(results)}"
-    )
-    return Table(cells, caption, rows)
-
-
 def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
-    """The first settings of the ranking, in few columns, as the terminal prints them.
+    """The first settings of the ranking.
 
     Args:
         results: The study.
         rows: The result of ``rank_settings`` for the metric, with the costs if there are prices.
         metric: The metric.
     """
-    top = rows.head(MOST_PRINTED)
+    top = rows.head(MOST_ROWS)
+    cells = _ranking_cells(results, top, metric)
+    cells.insert(0, "Rank", top["rank"].astype(str))
     marks = np.select([top["tied"], top["standing"] == SEEN_WORSE], ["≈", MARKS[SEEN_BELOW]], "")
-    cells = pd.DataFrame({"rank": top["rank"].astype(str), "": marks})
-    cells["policy"] = top["policy"]
-    for field in varied_values(results):
-        cells[field] = top[field].map(field_named(field).cell)
-    for measure in map(metric_of, with_way_home(results, [metric, SUCCESS, PRODUCT])):
-        if measure.column != COST:
-            cells[measure.head] = numbers.format_estimates(top, measure.column, measure.written)
-    if prices := results.study.costs:
+    cells.insert(1, "", marks)
+    if COST in rows:
         costs = numbers.format_estimates(top, COST, metric_of(COST).written)
-        cells[COST] = [f"{cost} {prices.unit}" for cost in costs]
-    settings = f"{len(rows):,} settings"
-    if len(rows) > MOST_PRINTED:
-        settings += f", the first {MOST_PRINTED} are shown"
-    legend = f"≈: the {metric_of(metric).within} may be as good as that of the first"
+        cells[metric_of(COST).name] = [f"{cost} {results.prices.unit}" for cost in costs]
+    caption = (
+        f"The first {len(top)} of {len(rows):,} settings by {metric_of(metric).within}: means with "
+        f"{intervals_in_words(results)}; ≈: may be the best"
+    )
     if (top["standing"] == SEEN_WORSE).any():
-        legend += f"; {MARKS[SEEN_BELOW]}: it is worse in what was seen, where {NOT_RULED_OUT}"
-    return Table(cells, f"{settings}; {legend}", rows)
+        caption += f"; {MARKS[SEEN_BELOW]}: not in what was seen, where {NOT_RULED_OUT}"
+    return Table(cells, caption, rows)
 
 
 def best_of_policies_table(results: Results, metric: str) -> Table:

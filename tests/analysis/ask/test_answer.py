@@ -135,7 +135,7 @@ def test_what_one_side_measures_has_no_difference(tmp_path):
     answers = answer.table().set_index("metric")
     assert np.isnan(answers.loc["age", ["before", "difference"]].astype(float)).all()
     assert (answers.loc["age", "n"], answers.loc["success", "n"]) == (0, 4)
-    lines = answer.variation.measures("greedy").set_index("Mean per mission")
+    lines = answer.variation.measures_table("greedy").cells.set_index("greedy")
     line = lines.loc["Age of information [mission slots]"]
     mean = answer.results.missions["age"].mean()
     assert line.tolist() == ["–", f"{mean:.2f}", ""]
@@ -238,7 +238,7 @@ def test_a_gain_in_most_missions_is_better_in_what_was_seen(answer):
     assert "higher in what was seen" in said[f"product with {policy}"]
     assert said[f"300 pairs with {policy}"] == "better in 78.0 %, worse in 22.0 %"
     assert f"missions to show it with {policy}" in said
-    ratio = variation.measures(like["policy"]).set_index("Mean per mission")
+    ratio = variation.measures_table(like["policy"]).cells.set_index(like["policy"])
     assert ratio.loc["Collection ratio", "Paired difference"].startswith("△ ")
 
 

@@ -27,8 +27,8 @@ def test_a_line_leads_to_a_page(dess, unrendered, tmp_path):
     assert "48 missions" in err
     name = re.search(r"sweeps/(uavs-quota-[0-9a-f]{16})\.toml", out)[1]
     assert len(load_results(tmp_path / "results" / "sweeps" / name).missions) == 48
-    assert re.search(r"rank +policy +uavs +quota +product +success +battery for the way home", out)
-    assert re.search(r"1 +≈? +(greedy|random) +[12] +(20|40)", out)
+    assert re.search(r"Rank +Policy +Point +uavs +quota +product +success\n", out)
+    assert re.search(r"1 +≈ +(greedy|random) +[0-3] +[12] +(20|40)", out)
     assert re.search(r"[24]0,000 USD", out)
     assert "8 settings" in out
     assert re.search(r"prices +a UAV 20,000 USD\n", out)

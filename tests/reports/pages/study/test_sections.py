@@ -59,7 +59,7 @@ STUDIES = {
             "These figures show the fleet of the answer",
             "The check of the selected fleets",
         ],
-        ["The best setting", "May be the best", "Pareto front", "Comparison with a baseline"],
+        ["The best setting", "≈: may be the best", "Pareto front", "Comparison with a baseline"],
     ),
     "a precision": (
         {"precision": PRECISION, "policies": ["greedy"]},
