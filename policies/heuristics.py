@@ -48,8 +48,10 @@ class RandomUnguarded:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        state, zones = view.state, view.world.chart.zones
-        return _choose_legal_actions(state.missions, state.uavs, zones, view.mission, view.uav)
+        state, chart = view.state, view.world.chart
+        return _choose_legal_actions(
+            state.missions, state.uavs, chart.zones, chart.sizes, view.mission, view.uav
+        )
 
 
 class _Heuristic:
@@ -128,22 +130,23 @@ KINDS = {"random-unguarded": UNGUARDED} | {
 
 
 @kernel
-def _choose_legal_actions(missions, uavs, zones, rows_mission, rows_uav):
+def _choose_legal_actions(missions, uavs, zones, sizes, rows_mission, rows_uav):
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
         i = rows_uav[row]
         mission, team = missions[rows_mission[row]], uavs[rows_mission[row]]
-        actions[row] = choose_at_random(mission, team, i, legal_moves(zones, team[i]))
+        legal = legal_moves(zones, team[i])
+        actions[row] = choose_at_random(mission, team, i, legal, sizes)
     return actions
 
 
 @inlined
-def choose_at_random(mission, team, i, allowed):
+def choose_at_random(mission, team, i, allowed, sizes):
     """A random one of the allowed moves into uncontested cells; Hover where there is none.
 
     ``allowed`` has a bit for each action.
     """
-    levels = contests(mission, team, i)
+    levels = contests(mission, team, i, sizes)
     moves = count = 0
     for action in range(4):
         if allowed >> action & 1 and contest(levels, action) == 0:
@@ -190,7 +193,7 @@ def choose_action(
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
     if kind == RANDOM:
-        return choose_at_random(mission, team, i, safe)
+        return choose_at_random(mission, team, i, safe, chart.sizes)
     goal_x, goal_y = home.x, home.y
     node = _choose_goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
@@ -205,7 +208,7 @@ def choose_action(
 def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
-    levels = contests(mission, team, i)
+    levels = contests(mission, team, i, chart.sizes)
     best = HOVER
     least = 1e18
     for action in range(5):

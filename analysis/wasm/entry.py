@@ -299,7 +299,7 @@ def play(table, first, count, launches, slots):
                     continue
                 if policies[i] == UNGUARDED:
                     legal = rules.legal_moves(chart.zones, team[i])
-                    actions[i] = choose_at_random(mission, team, i, legal)
+                    actions[i] = choose_at_random(mission, team, i, legal, chart.sizes)
                 else:
                     actions[i] = choose_action(
                         policies[i], mission, team, i, data, data_left, sensors, nodes, circuit,

@@ -18,11 +18,10 @@ import numpy as np
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import late_slots, margin, margin_slots, usable_battery
 from dess.model.guard.queues import find_ways, is_given_up, needs_pad
-from dess.model.guard.ways import battery_of_way, is_parked
+from dess.model.guard.ways import battery_of_way
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics.chart import distance, is_open, length_around
 from dess.physics.energy import waiting_slot
-from dess.physics.landing import lands
 
 # The price of a way home is the battery that it takes, and more for each unit that lacks for it and
 # the margin, and if it is not possible at all. No sum of lesser prices comes near a larger one.
@@ -34,10 +33,8 @@ _NO_WAY = 2**60
 def keeps_cell(mission, u):
     """Whether a UAV in a zone stays in its cell, whatever teammates need.
 
-    On the ground, one that neither charges nor waits for a pad flies on if they need its cell.
+    One that neither charges nor waits for a pad flies on if they need its cell.
     """
-    if not lands(mission):
-        return is_parked(mission, u)
     return u.active and u.zone >= 0 and (u.charging or u.pad_request >= 0 or u.grounded)
 
 

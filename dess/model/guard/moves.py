@@ -36,7 +36,7 @@ _MOST_BATTERY = 2**40  # more than any way costs
 
 
 @inlined
-def contests(mission, uavs, i):
+def contests(mission, uavs, i, sizes):
     """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to.
 
     Returns:
@@ -51,7 +51,7 @@ def contests(mission, uavs, i):
         east, south = o.x - u.x, o.y - u.y
         if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
-        parked = is_parked(mission, o)
+        parked = is_parked(mission, o, sizes)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -71,7 +71,7 @@ def contest(levels, action):
 
 
 @inlined
-def _ceded(mission, uavs, i):
+def _ceded(mission, uavs, i, sizes):
     """The actions of UAV ``i`` that may hinder teammates with less battery which come to charge.
 
     Returns:
@@ -85,7 +85,7 @@ def _ceded(mission, uavs, i):
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         if j == i or not goes_first or abs(east) + abs(south) > 2:
             continue
-        if not o.latch or not will_charge(mission, o) or is_parked(mission, o):
+        if not o.latch or not will_charge(mission, o) or is_parked(mission, o, sizes):
             continue
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -164,7 +164,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
         The safe actions, a bit for each.
     """
     u, planned = uavs[i], memory.planned
-    parked = is_parked(mission, u) and not (lands(mission) and home.gives_way == 1)
+    parked = is_parked(mission, u, chart.sizes) and not (lands(mission) and home.gives_way == 1)
     if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
         return 1 << HOVER  # it would lose its place in the queue, or on the ground
     reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0
@@ -174,7 +174,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     clear = nearest = in_time = empty = 0
     least = _MOST_BATTERY  # the battery that lacks on the way to the parking cell
     fewest = _MOST_BATTERY  # the battery that a move and the way from there need
-    levels = contests(mission, uavs, i)
+    levels = contests(mission, uavs, i, chart.sizes)
     searches = charge and not is_calm(reach)
     if searches:
         searches = is_late(mission, uavs, i, chart, planned, home, reserve, reach)
@@ -219,8 +219,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
         # a teammate may stay where it is, unless it is told to leave its cell, too
         leaves = elsewhere & empty or elsewhere & clear
         if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
-            leaves = elsewhere & ~_ceded(mission, uavs, i)
-        if u.overruled and u.zone >= 0 and is_tight(mission, chart):
+            leaves = elsewhere & ~_ceded(mission, uavs, i, chart.sizes)
+        if u.overruled and u.zone >= 0 and is_tight(mission, chart.sizes):
             # A teammate may want the same cell again and again, so it tries one after another, and
             # lets the teammate go first in some slots.
             leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere | 1 << HOVER
@@ -232,7 +232,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     if nearest & empty and least == 0 and u.overruled:
         return nearest & empty
     if nearest & clear and (least > 0 or u.overruled):
-        if least > 0 and (has_costs(mission) or is_tight(mission, chart)):
+        if least > 0 and (has_costs(mission) or is_tight(mission, chart.sizes)):
             return _nearer_to_zone(chart, u, nearest & clear)
         return nearest & clear
     if least > 0 and clear & in_time:
@@ -242,7 +242,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
         return 1 << HOVER
     if least == 0 and levels > 0:
-        nearest = nearest & ~_ceded(mission, uavs, i) or nearest
+        nearest = nearest & ~_ceded(mission, uavs, i, chart.sizes) or nearest
     return nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 

@@ -129,7 +129,7 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         return _nearest(uavs[i], chart)
     wait = begins = gives_way = np.int64(0)
     is_planned = may_wait(mission, uavs, data)
-    is_matched = not is_planned and is_tight(mission, chart)
+    is_matched = not is_planned and is_tight(mission, chart.sizes)
     if is_planned:
         for zone in range(mission.zones):
             memory.plan.queues[zone].is_full = 0
@@ -234,7 +234,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
         The ``Home``, without waits; the UAV's own cell if all are taken.
     """
     u, taken, turns = uavs[i], memory.taken, memory.plan.turns
-    are_matched = is_tight(mission, chart)
+    are_matched = is_tight(mission, chart.sizes)
     if are_matched and keeps_cell(mission, u):
         memory.planned[:] = -1
         return stays(u)
@@ -244,7 +244,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
         memory.planned[j] = -1
         if not o.active or o.zone < 0:
             continue
-        keeps = _has_cell(mission, o, are_matched) or not is_crowded(mission, chart, o.zone)
+        keeps = _has_cell(mission, o, chart, are_matched) or not is_crowded(mission, chart, o.zone)
         if not are_matched:
             keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
@@ -252,7 +252,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
     for place in range(count):
         j = memory.order[place]
         o = uavs[j]
-        if j != i and (o.grounded or _has_cell(mission, o, are_matched)):
+        if j != i and (o.grounded or _has_cell(mission, o, chart, are_matched)):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
@@ -268,11 +268,11 @@ def _choose(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
-def _has_cell(mission, u, are_matched):
+def _has_cell(mission, u, chart, are_matched):
     """Whether a UAV keeps its cell, and chooses none."""
     if are_matched:
         return keeps_cell(mission, u)
-    return is_parked(mission, u)
+    return is_parked(mission, u, chart.sizes)
 
 
 @inlined

@@ -18,15 +18,18 @@ CELLS_PER_UAV = 4
 
 
 @inlined
-def is_parked(mission, u):
+def is_parked(mission, u, sizes):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded.
 
-    In missions that end on the ground, it also stands there shortly before the end, and if it could
-    not leave the zone (``cannot_leave``).
+    Where all UAVs together would fill a zone, one that has not yet asked for a pad may only fly
+    over it. In missions that end on the ground, a UAV also stands there shortly before the end, and
+    if it could not leave the zone (``cannot_leave``).
     """
-    stays = u.latch
-    if lands(mission):  # there the latch is set whenever a UAV may charge
-        stays = u.charging or u.pad_request >= 0 or u.battery <= mission.charge_start
+    stays = u.charging or u.pad_request >= 0
+    if not lands(mission):
+        stays = stays or (u.latch and not is_tight(mission, sizes))
+    else:  # there the latch is set whenever a UAV may charge
+        stays = stays or u.battery <= mission.charge_start
         stays = stays or ends_soon(mission, u) or cannot_leave(mission, u)
     return u.active and (u.grounded or (stays and u.zone >= 0))
 
@@ -38,11 +41,11 @@ def is_crowded(mission, chart, zone):
 
 
 @inlined
-def is_tight(mission, chart):
+def is_tight(mission, sizes):
     """Whether all UAVs together would fill some zone."""
     fewest = mission.uavs + 1
     for zone in range(mission.zones):
-        fewest = min(fewest, chart.sizes[zone])
+        fewest = min(fewest, sizes[zone])
     return fewest <= mission.uavs
 
 
@@ -58,7 +61,7 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
         if closed_x < 0:
             continue
         is_there = closed_x == to_x and closed_y == to_y
-        if is_there and (planned is not None or is_tight(mission, chart)):
+        if is_there and (planned is not None or is_tight(mission, chart.sizes)):
             continue  # it leaves the cell, or the UAV waits there for its turn in it
         before = distance(chart, x, y, closed_x, closed_y)
         more = before + distance(chart, closed_x, closed_y, to_x, to_y) - length
@@ -78,7 +81,7 @@ def path_length(mission, uavs, i, chart, planned, x, y, to_x, to_y):
 def _closed(mission, uavs, i, j, chart, planned):
     """The cell that UAV ``j`` closes to UAV ``i``, or -1."""
     o = uavs[j]
-    if j != i and is_parked(mission, o):
+    if j != i and is_parked(mission, o, chart.sizes):
         return o.x, o.y
     if planned is not None and planned[j] >= 0:
         return np.int64(chart.parking[planned[j], 0]), np.int64(chart.parking[planned[j], 1])

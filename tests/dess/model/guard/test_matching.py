@@ -97,6 +97,15 @@ def test_where_missions_go_on_in_the_air_uavs_take_turns_in_a_cell():
     assert _homes(team, **sea) == [(23, 1), (23, 3)]
 
 
+def test_who_only_flies_over_a_small_zone_leaves_its_cell_to_one_that_reaches_no_other():
+    """Missions go on in the air, where a latch alone does not say that a UAV stays."""
+    sea = STRIP | {"zones": [{"cells": [12, 1, 1, 1], "pads": 1}], "charge_start": 30}
+    over, other = ({"x": x, "y": 1, "battery": b, "latch": True} for x, b in ((12, 20), (16, 8)))
+    assert _homes([over, other], **sea) == [(0, 12), (12, 4)]
+    asked = over | {"pad_request": 1}
+    assert _homes([asked, other], **sea)[0] == (12, 0)
+
+
 # Seas of families whose second zone has four cells, for five UAVs. Each had a UAV that was lost or
 # was not on the ground at the end.
 TIGHT: dict[str, Any] = {"uavs": 5, "landing": True, "quota": 0}
