@@ -5,7 +5,7 @@
 "use strict";
 const NARROW = "(max-width: 40rem)"; // where settings are folded at first
 const SIDES = ["a", "b"];
-const [controlsA, controlsB] = SIDES.map((side) => new Controls(root, side, data.settings)), prices = new Prices(root, data.prices);
+const [controlsA, controlsB] = SIDES.map((side) => new Controls(root, side, data.settings)), prices = new Prices(root, data.prices, data.priced);
 const missions = named("missions"), gridMissions = named("grid-missions");
 const required = [...root.querySelectorAll("[data-panel=requirement]")].map((line, n) =>
     ({line, metric: named(`require-${n}`), bound: named(`bound-${n}`), slider: named(`slide-${n}`)}));
@@ -26,7 +26,7 @@ let gridKey = "", gridCommand = "";
 const choices = () => [controlsA.choice, controlsB.choice];
 // What the results depend on; not the number of missions, nor what is required.
 const chosenKey = () => choices().map((choice) => keyOfRun(choice, prices.amounts)).join(" ");
-const chosenCommand = () => studyCommand(data, controlsA.choice, controlsB.choice, wholeNumber(missions));
+const chosenCommand = () => studyCommand(data, controlsA.choice, controlsB.choice, prices.options, wholeNumber(missions));
 const isStale = () => comparison !== null && shownKey !== chosenKey();
 
 function tidy() {
@@ -127,7 +127,7 @@ function sweepCommand() {
         policy: controlsA.choice.policy,
         set: [...valuesOf(data, controlsA.choice).filter((value) => !/^(uavs|pads)=/.test(value)), ...axes],
         require: required.map(({metric, bound}) => `${metric.option}=${bound}${metric.suffix}`),
-        price: [...prices.options, ...data.priced],
+        price: prices.options,
         scenario: data.scenario,
         seed: data.seed,
     });

@@ -51,15 +51,15 @@ const simulateCommand = (about, choice, replication) => commandLine("simulate", 
 });
 
 /**
- * The study of two choices: both settings with both policies.
- * @type {(about: Named, a: Choice, b: Choice, missions: number) => string}
+ * The study of two choices: both settings with both policies. A sweep takes prices, too.
+ * @type {(about: Named, a: Choice, b: Choice, price: string[], missions: number) => string}
  */
-function studyCommand(about, a, b, missions) {
+function studyCommand(about, a, b, price, missions) {
     const policy = [...new Set([a.policy, b.policy])].join(",");
     const common = {policy, scenario: about.scenario, seed: about.seed, missions: Math.max(missions, 2)};
     const changes = about.settings.flatMap(({options}, n) =>
         a.positions[n] === b.positions[n] ? [] : [options[b.positions[n]]]);
-    if (!changes.length) return commandLine("sweep", {set: valuesOf(about, a), ...common});
+    if (!changes.length) return commandLine("sweep", {set: valuesOf(about, a), ...common, price});
     return commandLine("what-if", {baseline: valuesOf(about, a), set: changes, ...common});
 }
 
