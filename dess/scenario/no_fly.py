@@ -77,8 +77,7 @@ def no_fly_in(
     """(H, W) whether a cell is a no-fly cell of a file; notes tell what closes none or is not read.
 
     Args:
-        path: A file ``.txt``, ``.map``, ``.png``, ``.csv``, ``.tsv``, ``.geojson``, ``.json`` or
-            ``.plan``.
+        path: A file ``.txt``, ``.map``, ``.png``, or one that ``places.read_places`` reads.
         size: Cells of the grid from west to east and from north to south.
         projection: That of the sea, none if the nodes are cells.
         source: What is taken of the file.
@@ -88,7 +87,8 @@ def no_fly_in(
         InputError: If the file cannot be read, a map has another size, ``where`` takes no place, a
             cell is off the grid, or the file has degrees and the nodes are cells.
     """
-    return places.reader(path, _READERS)(path, size, projection, source, altitude)
+    read = _MAPS.get(path.suffix.lower(), _of_places)
+    return read(path, size, projection, source, altitude)
 
 
 def zones_in(path: Path, size: Size) -> list[Rectangle]:
@@ -99,7 +99,9 @@ def zones_in(path: Path, size: Size) -> list[Rectangle]:
     """
     from scipy import ndimage
 
-    pixels = places.reader(path, {".png": _pixels})(path, size)
+    if path.suffix.lower() != ".png":
+        raise InputError(path, "has no known file ending", ".png")
+    pixels = _pixels(path, size)
     is_blue = _is_blue(pixels)
     rectangles = ndimage.find_objects(ndimage.label(is_blue)[0])
     if not rectangles:
@@ -198,7 +200,7 @@ def _tell_unused(path: Path, source: NoFlyFile, kind: str, *used: str) -> None:
 def _of_places(
     path: Path, size: Size, projection: Projection | None, source: NoFlyFile, altitude: float
 ) -> np.ndarray:
-    is_geographic, features = places.reader(path, places.READERS)(path)
+    is_geographic, features = places.read_places(path, _MAPS)
     if not features:
         raise InputError(path, "has no places", "one or more")
     if is_geographic and projection is None:
@@ -535,9 +537,9 @@ def polygons_hold(
         InputError: If the file cannot be read.
     """
     is_held = np.zeros(len(spots), np.bool_)
-    if path.suffix.lower() not in places.READERS:
+    if path.suffix.lower() in _MAPS:
         return is_held
-    for place in source.chosen(places.reader(path, places.READERS)(path).places, path):
+    for place in source.chosen(places.read_places(path).places, path):
         for kind, rings in place.shapes:
             for turned in projection.shapes(rings) if kind == places.POLYGON else ():
                 is_held |= _lie_in(turned, spots)
@@ -557,7 +559,8 @@ def _lie_in(rings: list[np.ndarray], spots: np.ndarray) -> np.ndarray:
     return is_held
 
 
-_READERS: dict[str, Callable[..., np.ndarray]] = {
-    **{".txt": _of_text, ".map": _of_text, ".png": _of_picture},
-    **dict.fromkeys(places.READERS, _of_places),
+_MAPS: dict[str, Callable[..., np.ndarray]] = {
+    ".txt": _of_text,
+    ".map": _of_text,
+    ".png": _of_picture,
 }

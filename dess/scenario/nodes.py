@@ -93,7 +93,7 @@ class NodesFound(NamedTuple):
         Raises:
             InputError: If the file cannot be read or has no nodes.
         """
-        is_geographic, features = places.reader(path, places.READERS)(path)
+        is_geographic, features = places.read_places(path)
         points = [
             (place, ring[0])
             for place in source.chosen(features, path)

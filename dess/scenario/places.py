@@ -1,6 +1,6 @@
 """Places of users in files: rows of CSV files, and features of GeoJSON, with their projection.
 
-    read_table(Path("buoys.csv"))        # the places of a file, degrees or cells
+    read_places(Path("buoys.csv"))       # the places of a file, degrees or cells
 
 Columns of CSV files are known by their names, whatever the case (``COLUMNS``). Degrees are
 projected about the centre of the grid (equirectangular projection).
@@ -10,8 +10,9 @@ import csv
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -43,6 +44,9 @@ _LONGEST = 270
 # Of the geofence of a plan: the sides of a circle, its largest radius [m], and how far beyond all
 # of it UAVs are kept out [degrees].
 _SIDES, _MOST_RADIUS, _FAR = 64, 10**6, 90
+# Readers of other packages: entry points whose names are file endings, as ".kml", and whose values
+# are functions of a path that return ``Places``.
+GROUP = "dess.readers"
 # What a feature consists of, as GeoJSON calls it.
 POINT, LINE, POLYGON = "Point", "LineString", "Polygon"
 _GEOJSON = "a GeoJSON FeatureCollection"
@@ -205,15 +209,35 @@ class Source(Strict):
         return chosen
 
 
-def reader(path: Path, readers: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
-    """The function that reads files of this ending.
+def read_places(path: Path, others: Iterable[str] = ()) -> Places:
+    """The places in a file, by its ending; other packages may read further ones (``GROUP``).
+
+    Args:
+        path: The file.
+        others: Endings that are read elsewhere, for the message.
 
     Raises:
-        InputError: If there is none.
+        InputError: If no reader knows the ending, or the file cannot be read.
     """
-    if path.suffix.lower() not in readers:
-        raise InputError(path, "has no known file ending", ", ".join(readers))
-    return readers[path.suffix.lower()]
+    ending = path.suffix.lower()
+    if ending in READERS:
+        return READERS[ending](path)
+    added = {point.name: point for point in entry_points(group=GROUP)}
+    if ending not in added:
+        endings = [*others, *READERS, *added]
+        raise InputError(path, "has no known file ending", ", ".join(endings))
+    return _read_by(added[ending], path)
+
+
+def _read_by(point: EntryPoint, path: Path) -> Places:
+    """The places in a file by the reader of another package."""
+    try:
+        return Places(*point.load()(path))
+    except InputError:
+        raise
+    except Exception as error:  # code of others may raise anything; name it
+        problem = f"cannot be read by {point.value}: {type(error).__name__}: {error}"
+        raise InputError(path, problem, f"a {point.name} file") from error
 
 
 def is_on_grid(cell: Cell, size: Size) -> bool:

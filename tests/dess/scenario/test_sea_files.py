@@ -17,6 +17,7 @@ from dess.scenario.no_fly import NoFlyFile, centres_in
 from dess.scenario.nodes import NodesFile, NodesFound
 from dess.scenario.places import Projection, Size
 from tests.dess.scenario.shapes import EQUATOR, box, collection, feature
+from tests.outside import install_package
 
 
 def nodes_in(path: Path, size: Size, cell_size: float, **source: Any) -> tuple[Cell, ...]:
@@ -283,3 +284,50 @@ def test_files_that_are_refused(reader, name, content, line, write):
     with pytest.raises(InputError, match=f"^{path}: {line}") as error:
         read(path, *arguments)
     assert "\n" not in str(error.value)
+
+
+# --- readers of other packages ---
+
+GPX = """<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">
+<wpt lat="54.005" lon="8.0"><name>North</name></wpt>
+<wpt lat="53.995" lon="8.0"><name>South</name></wpt>
+</gpx>"""
+READER = '''
+from xml.etree import ElementTree
+
+import numpy as np
+
+from dess.scenario.places import POINT, Place, Places
+
+NAMES = {"": "http://www.topografix.com/GPX/1/1"}
+
+
+def read_gpx(path):
+    """The waypoints of a GPX file."""
+    places = []
+    for number, point in enumerate(ElementTree.parse(path).iterfind("wpt", NAMES)):
+        spot = np.array([[float(point.get("lon")), float(point.get("lat"))]])
+        name = point.findtext("name", "", NAMES)
+        places.append(Place(f"wpt {number}", {"name": name}, [(POINT, [spot])]))
+    return Places(True, places)
+'''
+
+
+def test_a_package_reads_files_of_another_ending(tmp_path, monkeypatch):
+    """Nodes and no-fly cells come from the waypoints of a GPX file; a broken file is named."""
+    (tmp_path / "buoys.gpx").write_text(GPX)
+    sea = tmp_path / "sea.toml"
+    sea.write_text('nodes = "buoys.gpx"\ngrid = 16\ncell_size = 100\nzone = [0, 0, 4, 1]\n')
+    with pytest.raises(InputError, match="has no known file ending; allowed: .csv, .tsv"):
+        load_scenario(sea)
+    entry = {".gpx": "gpx_reader:read_gpx"}
+    install_package(tmp_path / "site", monkeypatch, "gpx_reader", READER, "dess.readers", **entry)
+    assert load_scenario(sea).names == ("North", "South")
+    assert [y for _, y in load_scenario(sea).nodes] == [2, 13]
+    sea.write_text(sea.read_text() + 'no_fly = {file = "buoys.gpx", where = {name = "South"}}\n')
+    with pytest.raises(InputError, match="South at .* is a no-fly cell"):
+        load_scenario(sea)
+    (tmp_path / "buoys.gpx").write_text("<gpx>")
+    line = "buoys.gpx: cannot be read by gpx_reader:read_gpx: ParseError: .*; allowed: a .gpx file"
+    with pytest.raises(InputError, match=line):
+        load_scenario(sea)
