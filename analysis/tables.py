@@ -133,9 +133,9 @@ def allowance_sentence(what: str, plain: str, wide: str, n: int) -> str:
     """
     few = numbers.format_count(max(round(n / 3), 1), "mission")
     return (
-        f"The intervals allow for rare failures, which the missions may not show: {n:,} missions "
-        f"without one do not rule out a failure in {few}. Without this allowance (Student's t), "
-        f"{what} would be known to {plain}; with it, to {wide}."
+        f"The intervals allow for failures that are too rare to be seen: {n:,} missions without a "
+        f"failure do not rule out one in {few}. With this allowance, {what} is known to {wide}; "
+        f"without it (Student's t), to {plain}."
     )
 
 

@@ -44,7 +44,8 @@ PANEL, ASKED = "panel", "what-if"  # the picture of a panel, and its page
 LOOK = (
     *("layout.html", "report.html", "bar.html", "index.html", "part.html", "picture.html"),
     *("player.html", "player.js", "explorer.html", "explorer.js", "style.css"),
-    *("panel.html", "panel.css", "panel_side.html", "panel_sliders.html", "panel.js", "try.html"),
+    *("panel.html", "panel.css", "panel_side.html", "panel_sliders.html", "panel_metrics.html"),
+    *("panel_controls.js", "panel_view.js", "panel_runs.js", "panel.js", "try.html"),
 )
 FINDING, LOOKED = "Finding", "Look"  # what a picture keeps, as texts of a PNG file
 

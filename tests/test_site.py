@@ -112,7 +112,7 @@ def test_the_search_finds_the_page_of_the_fleet_by_the_question(site, chromium):
 
 def test_tables_have_heads_and_take_the_keyboard(site, chromium):
     """A table that is wide scrolls, so the keyboard has to reach it; links are underlined."""
-    for name in ("environments.html", "performance.html", "index.html"):
+    for name in ("environments.html", "architecture.html", "index.html"):
         page = Visit(chromium, site / name, WIDTHS[1]).page
         heads = page.locator("thead th").all_text_contents()
         assert heads and all(map(str.strip, heads)), name

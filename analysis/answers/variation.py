@@ -373,10 +373,12 @@ class Variation:
 
     @property
     def sides(self) -> tuple[list[str], list[str]]:
-        """The changed fields with their values in the baseline and in the variation: ``uavs 3``."""
-        table = self._fields(self._changed)
-        before, after = (table["Field"] + " " + table[side] for side in ("Baseline", "Variation"))
-        return [*before], [*after]
+        """The changed fields with their values in the baseline and in the variation: ``3 UAVs``."""
+        before, after = (
+            [field_named(name).words(self._value_in_words(side, name)) for name in self._changed]
+            for side in (BASELINE, VARIATION)
+        )
+        return before, after
 
     def measures_table(self, policy: str) -> Table:
         """The means of a policy on both sides, and their differences."""

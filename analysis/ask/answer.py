@@ -64,6 +64,10 @@ class Answer(ABC):
     def own_facts(self) -> list[Fact]:
         """What was found, required and guaranteed."""
 
+    def named_points(self) -> Iterable[int]:
+        """The design points that the answer names: all, unless it names a best one."""
+        return range(len(self.results.store.manifest.scenarios))
+
     @abstractmethod
     def table(self) -> pd.DataFrame:
         """The numbers of what was compared, a row for each."""
@@ -78,7 +82,7 @@ class Answer(ABC):
 
     def facts(self) -> list[Fact]:
         """The facts of the answer, and with a data sheet which nodes no UAV can serve."""
-        notes = scenario_notes(self.results.store.manifest.scenarios)
+        notes = scenario_notes(map(self.results.scenario, self.named_points()))
         return [*self.own_facts(), *(Fact("note", note) for note in notes)]
 
     @property
@@ -126,6 +130,10 @@ class SweepAnswer(Answer):
         if self.results.study.costs:
             facts += price_facts(self.results)
         return facts
+
+    def named_points(self) -> Iterable[int]:
+        """The design point of the best setting."""
+        return [self._ranked()["point"].iloc[0]]
 
     def assumptions(self) -> list[Fact]:
         """What the answer assumes, where the scenario has a data sheet."""
@@ -229,6 +237,10 @@ class FleetAnswer(SweepAnswer):
             facts += risk_facts(results, best.policy, best.points)
             facts += [*limit_facts(results), *one_more_facts(results), *fall_facts(results)]
         return [*facts, *price_facts(results)]
+
+    def named_points(self) -> Iterable[int]:
+        """The design points of the cheapest fleet; all if none is found."""
+        return search_of(self.results).best.points or Answer.named_points(self)
 
     def fleets(self) -> pd.DataFrame:
         """The fleets that the answer was chosen from, the cheapest first.

@@ -504,13 +504,13 @@ def _find_most_data(fleet: _Fleet, rate: str | tuple[str, ...]) -> Limit:
         [trials[factor]] = fleet.try_changes([change(factor)])
         search.learn(factor, trials[factor].broken)
     digits = _digits_of_limit(trials, search.broken)
-    present = "what the sheet lists"
+    present = "the listed rates"
     last = present
     if isinstance(rate, str):
         present = rate
         last = max(rate, rounded(multiply(search.low), digits), key=_bits_per_second)
     elif search.low > 1:
-        last = f"{rounded(f'{search.low:g} times', digits)} what the sheet lists"
+        last = f"{rounded(f'{search.low:g} times', digits)} the listed rates"
     small_zone = ""
     if search.broken == "success":
         small_zone = fleet.small_zone_of_losses(change(search.high))

@@ -22,6 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from dess.analysis.figures import style
 from dess.analysis.metrics import DRAWN_UNITS, size_of
 from dess.analysis.names import value_text
+from dess.analysis.numbers import format_quantity
 from dess.analysis.results import event_log
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
@@ -131,10 +132,10 @@ def plot_residual(events: event_log.Events, scenario: Scenario, ax: Axes) -> Non
     ax.stackplot(data.index, data.to_numpy().T, colors=colours, alpha=0.75, linewidth=0)
     total = data.sum(axis=1)
     ax.plot(total.index, total, color=style.INK, linewidth=1.6, label="all nodes")
-    size = 1.0
+    left = f"{total.iloc[-1]:.0f}"
     if scenario.units:
-        size = size_of(DRAWN_UNITS["data"], scenario.units)
-    _margin_note(f"{total.iloc[-1] * size:.0f} left", total.iloc[-1], ax)
+        left = format_quantity(total.iloc[-1] * size_of(DRAWN_UNITS["data"], scenario.units))
+    _margin_note(f"{left} left", total.iloc[-1], ax)
     ax.set(title="Residual data, a band per node", ylim=(0, None))
     ax.set_ylabel(_unit_of_axis(ax.yaxis, "data", "data units", scenario, 5))
     _time_axis(events, scenario, ax)

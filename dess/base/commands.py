@@ -14,12 +14,21 @@ def command_line(*words: object, **options: Any) -> str:
 
     Args:
         *words: What stands behind ``dess``.
+        **options: The value of each option, as in ``command_options``.
+    """
+    return f"{shlex.join(['dess', *map(str, words)])} {command_options(**options)}".rstrip()
+
+
+def command_options(**options: Any) -> str:
+    """Options of a command, in their order.
+
+    Args:
         **options: The value of each option. One that is None is left out, one that is True has no
             value, one that is a list is repeated, and one that is a mapping is repeated with
             ``KEY=VALUE``.
     """
-    option_words = [word for name, value in options.items() for word in _option(f"--{name}", value)]
-    return shlex.join(["dess", *map(str, words), *option_words])
+    words = [word for name, value in options.items() for word in _option(f"--{name}", value)]
+    return shlex.join(words)
 
 
 def _option(name: str, value: Any) -> Iterator[str]:

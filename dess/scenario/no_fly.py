@@ -46,7 +46,10 @@ _REMEDY = "touched = true closes all cells that they touch"
 # What a place says of its extent, by the last word of a property: its radius, perhaps with a unit
 # as in "Radius (km)"; what is not read; from and up to which altitude it reaches.
 _RADIUS = re.compile(r"radius[ _.-]*[(\[]?([a-z]*)[)\]]?", re.IGNORECASE)
-_UNREAD = re.compile(r"radius|diameter|width|buffer|wkt|polygon", re.IGNORECASE)
+_UNREAD = re.compile(
+    "radius|diameter|width|buffer|wkt|polygon|ellipse|semi.?(?:major|minor)|(?<![a-z])range|extent",
+    re.IGNORECASE,
+)
 _LOWER = re.compile(r"lower|floor|min_?alt", re.IGNORECASE)
 _UPPER = re.compile(r"upper|ceil|max_?alt", re.IGNORECASE)
 _OF_A_LIMIT = re.compile(r"ref|datum|unit|uom", re.IGNORECASE)
@@ -381,7 +384,9 @@ def _limits(place: Place, kind: re.Pattern[str]) -> list[float]:
 def _cells_of(
     place: Place, projection: Projection, source: NoFlyFile, radius: float
 ) -> tuple[np.ndarray, bool]:
-    """The cells that a feature closes, and whether its bounding box has a part on the grid.
+    """The cells that a feature closes, and whether it has a part on the grid, or seems to.
+
+    Without holes, its bounding box tells; the sea may also lie in a hole.
 
     Args:
         place: The feature.
@@ -405,7 +410,7 @@ def _cells_of(
             beyond = margin + _HAIR
             if (high + beyond < 0).any() or (low - beyond >= size).any():
                 continue
-            is_near = True
+            is_near |= len(turned) == 1 or len(_border_within(turned, size)) > 0
             if kind == places.POINT:
                 closed |= _cells_at(turned[0][0], size)
                 if not reach:
@@ -425,14 +430,18 @@ def _has_gaps(place: Place, projection: Projection, beside: np.ndarray) -> bool:
         projection: That of the sea.
         beside: (H, W) whether a cell is closed, or one of those around it.
     """
-    size = np.array(projection.size)
     for kind, rings in place.shapes:
         for turned in projection.shapes(rings) if kind == places.POLYGON else ():
-            cells = np.concatenate([_border_of(ring, projection.size) for ring in turned])
-            x, y = cells[((cells > 0) & (cells < size - 1)).all(1)].T  # beyond the rim is land
+            x, y = _border_within(turned, projection.size).T
             if not beside[y, x].all():
                 return True
     return False
+
+
+def _border_within(rings: list[np.ndarray], size: Size) -> np.ndarray:
+    """(K, 2) the cells along rings, without those at the rim of the grid, beyond which is land."""
+    cells = np.concatenate([_border_of(ring, size) for ring in rings])
+    return cells[((cells > 0) & (cells < np.array(size) - 1)).all(1)]
 
 
 def _border_of(ring: np.ndarray, size: Size) -> np.ndarray:

@@ -11,7 +11,6 @@ description.training.seed, description.layout.nodes, description.model_sha256
 import hashlib
 import json
 import re
-import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -25,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess.base.commands import command_line
+from dess.base.commands import command_line, command_options
 from dess.base.elementary import log10
 from dess.base.errors import InputError, shown, validated
 from dess.base.files.documents import Document, Sha256
@@ -335,7 +334,7 @@ def validate_config(values: dict[str, Any], where: str) -> TrainingConfig:
         raise InputError(
             where,
             f"{key} is a field of the scenario",
-            f"--set {shlex.quote(f'{key}={toml_value(values[key])}')}, or {key} in the table [set]",
+            f"{command_options(set={key: toml_value(values[key])})}, or {key} in the table [set]",
         )
     return validated(TrainingConfig, values, where)
 

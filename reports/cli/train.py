@@ -1,6 +1,5 @@
 """``dess train``: train a policy into a folder."""
 
-import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from dess.base.commands import command_line
+from dess.base.commands import command_line, command_options
 from dess.base.errors import InputError, shown
 from dess.base.libraries import missing, needs
 from dess.reports.cli import console, options
@@ -78,7 +77,7 @@ def train(
             what = "replay memory"
         console.print_text(f"{what}: {memory / 2**20:,.0f} MiB", sys.stderr)
         console.print_text(
-            view or f"curves: tensorboard --logdir {shlex.quote(str(out / EVENTS))}", sys.stderr
+            view or f"curves: tensorboard {command_options(logdir=out / EVENTS)}", sys.stderr
         )
 
     command = resume_command(config, name, out, device)
@@ -104,7 +103,7 @@ def train(
     if not training.done:
         raise console.Interruption(
             f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
-            f"--policy {shlex.quote(str(out))}; continue with {command}"
+            f"{command_options(policy=out)}; continue with {command}"
         )
     console.print_text(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "

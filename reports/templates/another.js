@@ -20,8 +20,8 @@ function play() {
     number.value = replication;
     shown = simulateCommand(data, choice, replication);
     playMissions(find("player"), {"panel-player-a": {engine, title: `Mission ${replication} of ${choice.policy}`}}, replication);
-    engine.call("play", replication, 1);
-    engine.call("measure", 1);
+    engine.exports.play(replication, 1);
+    engine.exports.measure(1);
     const values = engine.floats("values"), told = data.metrics.filter(({isOffered, column}) => isOffered && !Number.isNaN(values[column]));
     const texts = told.map((metric) => `${metric.name.toLowerCase()} ${written(metric, values[metric.column])}`);
     const hash = hashesOf(choice)[replication], isSame = hash === sha256(engine.record(0));

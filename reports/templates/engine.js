@@ -87,16 +87,6 @@ class Engine {
         if (!image.isBare) this.exports.prepare();
     }
 
-    /**
-     * Call the module.
-     * @param {string} name
-     * @param {number[]} numbers
-     * @returns {number}
-     */
-    call(name, ...numbers) {
-        return this.exports[name](...numbers);
-    }
-
     // Memory may have grown, so that views have to be made again after each call of the module.
     view(kind, place, length) {
         return new kind(this.exports.memory.buffer, place, length);
@@ -112,13 +102,7 @@ class Engine {
     }
 
     floats(name) {
-        const bytes = this.bytes(name);
-        return this.view(Float64Array, bytes.byteOffset, bytes.length / 8);
-    }
-
-    integers(name) {
-        const bytes = this.bytes(name);
-        return this.view(BigInt64Array, bytes.byteOffset, bytes.length / 8);
+        return this.view(Float64Array, this.places[name], this.bytes(name).length / 8);
     }
 
     /**
@@ -163,7 +147,8 @@ class Engine {
      * @param {string} policy
      */
     follow(policy) {
-        this.integers("policies").fill(BigInt(this.image.policies[policy]));
+        const words = this.bytes("policies").length / 8;
+        this.view(BigInt64Array, this.places.policies, words).fill(BigInt(this.image.policies[policy]));
     }
 }
 

@@ -5,7 +5,7 @@
 "use strict";
 const NARROW = "(max-width: 40rem)"; // where settings are folded at first
 const SIDES = ["a", "b"];
-const [controlsA, controlsB] = SIDES.map((side) => new Controls(root, side, data.settings)), prices = new Prices(root, data.prices);
+const [controlsA, controlsB] = SIDES.map((side) => new Controls(root, side, data.settings)), prices = new Prices(root, data.prices, data.priced);
 const missions = named("missions"), gridMissions = named("grid-missions");
 const required = [...root.querySelectorAll("[data-panel=requirement]")].map((line, n) =>
     ({line, metric: named(`require-${n}`), bound: named(`bound-${n}`), slider: named(`slide-${n}`)}));
@@ -26,7 +26,7 @@ let gridKey = "", gridCommand = "";
 const choices = () => [controlsA.choice, controlsB.choice];
 // What the results depend on; not the number of missions, nor what is required.
 const chosenKey = () => choices().map((choice) => keyOfRun(choice, prices.amounts)).join(" ");
-const chosenCommand = () => studyCommand(data, controlsA.choice, controlsB.choice, wholeNumber(missions));
+const chosenCommand = () => studyCommand(data, controlsA.choice, controlsB.choice, prices.options, wholeNumber(missions));
 const isStale = () => comparison !== null && shownKey !== chosenKey();
 
 function tidy() {
@@ -40,7 +40,7 @@ function start() {
     tidy();
     const [a, b] = choices().map((choice) => {
         const changes = [...changesInWords(data.check, choice), ...prices.changesInWords(prices.amounts)];
-        return runs.of(choice, prices.amounts, changes, wholeNumber(missions));
+        return runs.runOf(choice, prices.amounts, changes, wholeNumber(missions));
     });
     present(a === b ? [a] : [a, b], wholeNumber(missions));
 }
@@ -88,7 +88,7 @@ function show(why = "") {
     controlsA.show();
     controlsB.show(controlsA.positions);
     const changes = changesInWords(controlsA.choice, controlsB.choice);
-    find("differing").textContent = changes.length ? `A → B: ${changes.join("; ")}` : "A and B are the same"; // where settings are folded
+    find("differing").textContent = changes.length ? `A → B: ${changes.join("; ")}` : "A and B are the same";
     find("command").textContent = chosenCommand();
     showRequired();
     if (!comparison) return;
@@ -120,15 +120,14 @@ const keyOfGrid = () => [
 
 // The search of which the grid is an exploration, where the command can require the metrics.
 function sweepCommand() {
-    const required = requirements(), a = controlsA.choice, isAxis = ({key}) => key === "uavs" || key === "pads";
+    const required = requirements(), axes = ["uavs", "pads"].map((key) =>
+        `${key}=${data.grid[key].map((position) => data.settings.find((setting) => setting.key === key).texts[position]).join(",")}`);
     if (!required.every(({metric}) => metric.option)) return "";
-    const others = valuesOf(data, a, (setting, n) => isAxis(setting) || a.positions[n] === setting.default);
-    const axes = data.settings.filter(isAxis).map(({key, texts}) => `${key}=${data.grid[key].map((position) => texts[position]).join(",")}`);
     return commandLine("sweep", {
-        policy: a.policy,
-        set: [...data.fixed, ...others, ...axes],
+        policy: controlsA.choice.policy,
+        set: [...valuesOf(data, controlsA.choice).filter((value) => !/^(uavs|pads)=/.test(value)), ...axes],
         require: required.map(({metric, bound}) => `${metric.option}=${bound}${metric.suffix}`),
-        price: [...prices.options, ...data.priced],
+        price: prices.options,
         scenario: data.scenario,
         seed: data.seed,
     });
@@ -140,8 +139,9 @@ function fill() {
     gridMissions.value = wholeNumber(gridMissions);
     if (keyOfGrid() !== gridKey) {
         const required = requirements(), choices = choicesOfGrid(), error = GRID_ERROR / choices.length / required.length;
+        const heads = find("grid").tHead.rows[0].cells;
         const cells = choices.map(({place, choice}) => {
-            const name = `${place.closest("table").tHead.rows[0].cells[place.cellIndex].textContent}, ${place.parentElement.cells[0].textContent}`;
+            const name = `${heads[place.cellIndex].textContent}, ${place.parentElement.cells[0].textContent}`;
             return {name, place, track: new Track(crew.simulator, name, choice, prices.amounts, error)};
         });
         grid = new Grid(cells, required, metricOf("cost"), data.indifference);
@@ -299,17 +299,19 @@ function showMission(row) {
 
 // The state of the panel in the address, after #: text of strangers, of which only known names and
 // values within their limits count. It starts nothing.
-/** @type {() => any[]} */
-const kept = () => [...root.querySelectorAll("[name]:not([name^=slide])")];
-const addressOf = () => `${location.href.split("#")[0]}#${new URLSearchParams(kept().map(({name, value}) => [name, value]))}`;
+/** @type {any[]} */
+const inputs = [...root.querySelectorAll("[name]:not([name^=slide])")];
+const addressOf = () => `${location.href.split("#")[0]}#${new URLSearchParams(inputs.map(({name, value}) => [name, value]))}`;
 
+// Whether the address has anything for the panel.
 function readAddress() {
-    const state = new URLSearchParams(location.hash.slice(1)), asked = kept().filter(({name}) => state.has(name));
+    const state = new URLSearchParams(location.hash.slice(1)), asked = inputs.filter(({name}) => state.has(name));
     for (const input of asked) {
         const text = state.get(input.name), isPosition = /^\d{1,2}$/.test(text) && Number(text) <= Number(input.max);
-        const isNamed = [...input.options ?? []].some(({value}) => value === text);
-        if (input.type === "range" ? isPosition : isNamed) input.value = text;
-        if (input.type === "number" && /^\d{1,12}(\.\d{1,6})?$/.test(text)) input.value = Math.min(Number(text), Number(input.max || Infinity));
+        const isAmount = /^\d{1,12}(\.\d{1,6})?$/.test(text), most = Number(input.max || Infinity);
+        if (input.type === "range" && isPosition) input.value = text;
+        if (input.type === "number" && isAmount) input.value = Math.min(Number(text), most);
+        if (input.options && [...input.options].some(({value}) => value === text)) input.value = text;
     }
     return asked.length > 0;
 }

@@ -39,31 +39,28 @@ const optionsInWords = (options) => Object.entries(options).flatMap(([name, valu
 const commandLine = (name, options) => `dess ${name} ${optionsInWords(options)}`;
 
 /**
- * What commands say of the settings that are not left out.
- * @type {(about: Named, choice: Choice, isLeftOut: (setting: Setting, n: number) => boolean) => string[]}
+ * What commands have to say of the settings.
+ * @type {(about: Named, choice: Choice) => string[]}
  */
-const valuesOf = ({settings}, {positions}, isLeftOut) => settings.flatMap((setting, n) =>
-    isLeftOut(setting, n) ? [] : [setting.options[positions[n]]]);
-
-/** @type {(about: Named, choice: Choice) => string[]} */
-const allValuesOf = (about, choice) =>
-    [...about.fixed, ...valuesOf(about, choice, (setting, n) => choice.positions[n] === setting.default)];
+const valuesOf = ({fixed, settings}, choice) => [...fixed, ...settings.flatMap((setting, n) =>
+    choice.positions[n] === setting.default ? [] : [setting.options[choice.positions[n]]])];
 
 /** @type {(about: Named, choice: Choice, replication: number) => string} */
 const simulateCommand = (about, choice, replication) => commandLine("simulate", {
-    policy: choice.policy, scenario: about.scenario, set: allValuesOf(about, choice), seed: about.seed, replication,
+    policy: choice.policy, scenario: about.scenario, set: valuesOf(about, choice), seed: about.seed, replication,
 });
 
 /**
- * The study of two choices: both settings with both policies.
- * @type {(about: Named, a: Choice, b: Choice, missions: number) => string}
+ * The study of two choices: both settings with both policies. A sweep takes prices, too.
+ * @type {(about: Named, a: Choice, b: Choice, price: string[], missions: number) => string}
  */
-function studyCommand(about, a, b, missions) {
+function studyCommand(about, a, b, price, missions) {
     const policy = [...new Set([a.policy, b.policy])].join(",");
     const common = {policy, scenario: about.scenario, seed: about.seed, missions: Math.max(missions, 2)};
-    const changes = valuesOf(about, b, (_, n) => a.positions[n] === b.positions[n]);
-    if (!changes.length) return commandLine("sweep", {set: allValuesOf(about, a), ...common});
-    return commandLine("what-if", {baseline: allValuesOf(about, a), set: changes, ...common});
+    const changes = about.settings.flatMap(({options}, n) =>
+        a.positions[n] === b.positions[n] ? [] : [options[b.positions[n]]]);
+    if (!changes.length) return commandLine("sweep", {set: valuesOf(about, a), ...common, price});
+    return commandLine("what-if", {baseline: valuesOf(about, a), set: changes, ...common});
 }
 
 /**

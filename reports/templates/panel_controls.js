@@ -49,9 +49,11 @@ class Prices {
     /**
      * @param {any} root
      * @param { {name: string, label: string}[]} prices
+     * @param {string[]} others - what commands say of prices beside them
      */
-    constructor(root, prices) {
+    constructor(root, prices, others) {
         this.prices = prices;
+        this.others = others;
         this.inputs = prices.map(({name}) => root.querySelector(`[name="price-${name}"]`));
     }
 
@@ -63,9 +65,10 @@ class Prices {
         this.inputs.forEach((input, n) => { input.value = Number.isNaN(amounts[n]) ? "" : amounts[n]; });
     }
 
-    // Those that have a price of their own, as `uav=20000`.
+    // What commands say: those that have a price of their own, as `uav=20000`, and what is beside them.
     get options() {
-        return this.prices.flatMap(({name}, n) => Number.isNaN(this.amounts[n]) ? [] : [`${name}=${this.amounts[n]}`]);
+        const priced = this.prices.flatMap(({name}, n) => Number.isNaN(this.amounts[n]) ? [] : [`${name}=${this.amounts[n]}`]);
+        return [...priced, ...this.others];
     }
 
     /**

@@ -65,7 +65,8 @@ class Run extends Track {
      * @param {number} count
      */
     products(count) {
-        return Array.from({length: count}, (_, row) => this.values[row * this.width + data.product]);
+        const {values, width} = this;
+        return Array.from({length: count}, (_, row) => values[row * width + data.product]);
     }
 }
 
@@ -89,11 +90,12 @@ class Runs {
      * The run of a setting that has at most so many missions; a new one if there is none.
      * @type {(choice: Choice, prices: number[], changes: string[], most: number) => Run}
      */
-    of(choice, prices, changes, most) {
+    runOf(choice, prices, changes, most) {
         const key = keyOfRun(choice, prices), runs = [...this.rows.keys()];
         const known = runs.find((run) => run.key === key && run.count <= most);
         if (known) return known;
-        const run = new Run(this.simulator, ++this.number, choice, prices), row = find("run-row").content.firstElementChild.cloneNode(true);
+        const run = new Run(this.simulator, ++this.number, choice, prices);
+        const row = find("run-row").content.firstElementChild.cloneNode(true);
         row.cells[1].textContent = changes.join("; ") || "nothing";
         row.querySelector("button").addEventListener("click", () => this.press(run));
         find("run-rows").append(row);
@@ -125,8 +127,9 @@ class Runs {
             button.setAttribute("aria-pressed", String(side >= 0));
             button.textContent = side >= 0 ? `${run.name}: ${NAMES[side]}` : run.name;
             row.cells[2].textContent = grouped(run.count);
-            const measured = metrics.filter((metric) => run.estimate(metric).count);
-            row.cells[3].textContent = measured.map((metric) => `${metric.name} ${interval(metric, run.estimate(metric))}`).join("; ");
+            const means = metrics.filter((metric) => run.estimate(metric).count)
+                .map((metric) => `${metric.name} ${interval(metric, run.estimate(metric))}`);
+            row.cells[3].textContent = means.join("; ");
         }
     }
 }

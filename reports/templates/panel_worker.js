@@ -14,8 +14,8 @@ onmessage = ({data}) => {
     }
     const {name, first, count, job, wantsRecords} = data;
     const engine = keptEngine(data), began = performance.now();
-    engine.call("play", first, count);
-    engine.call("measure", count);
+    engine.exports.play(first, count);
+    engine.exports.measure(count);
     const values = engine.floats("values").slice(0, count * engine.image.metrics.length);
     const records = wantsRecords ? Array.from({length: count}, (_, row) => engine.record(row)) : null;
     postMessage({name, first, count, job, values, records, took: performance.now() - began});

@@ -37,7 +37,8 @@ def test_of_several_fleets_the_one_that_reaches_least_is_told(capsys):
     assert unreachable_sentences([ScenarioSpace.of()]) == []
 
 
-def test_an_answer_tells_it_too(tmp_path):
+def test_an_answer_tells_it_of_what_it_names(tmp_path):
+    """One UAV is as good as two, whose margins would leave out one more node."""
     [space] = _spaces(1)
     (tmp_path / "sea.toml").write_text(space.to_toml())
     found = analysis.sweep(
@@ -45,8 +46,7 @@ def test_an_answer_tells_it_too(tmp_path):
     )
     assert [fact.found for fact in found.facts() if fact.label == "note"] == [
         "out of reach of a UAV from a full battery: far",
-        "beyond the margins that the return guard keeps for 2 UAVs: between",
-        "without these nodes a collection ratio of 33.3 % is the highest",
+        "without these nodes a collection ratio of 66.7 % is the highest",
     ]
 
 
@@ -62,7 +62,7 @@ def test_a_command_tells_it_once(more, tmp_path, capsys, monkeypatch):
     command += ["--policy", "greedy", "--missions", "2", "--results", str(tmp_path / "results")]
     assert main([*command, *more]) == 0
     told = " ".join("".join(capsys.readouterr()).split())
-    assert told.count("a collection ratio of 33.3 % is the highest") == 1
+    assert told.count("% is the highest") == 1
 
 
 def _crowded(**fields: Any) -> ScenarioSpace:

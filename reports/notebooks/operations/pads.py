@@ -106,8 +106,9 @@ display(
 # ## How this page was made
 #
 # The mission is that of the paper, with a zone of 16 cells. It ends in the air: not all UAVs have
-# the battery for the way home. The README's question has a data sheet, and so `landing = true`:
-# there, all UAVs of a successful mission have landed, so do not compare these shares with its own.
+# the battery for the way home. The README's questions have missions that end on the ground
+# (`landing = true`): there, all UAVs of a successful mission have landed. So do not compare their
+# shares with these.
 # A waiting time ends when the UAV is given a pad or gives up. Queue and utilisation are means over
 # the time of the mission.
 

@@ -156,10 +156,9 @@ def test_an_allowance_for_failures_is_said_with_both_intervals():
     missions = pd.DataFrame(rows, columns=["policy", "replication", PRODUCT, "uavs"])
     text = summary.allowance_for_difference(compare(missions, "b", [PRODUCT]), "policy")
     # Student's t of ±0.5 points: 1.968 x 0.5 / sqrt(299); with 0.8 and -0.7 added: ±0.7 points.
-    assert "300 missions without one do not rule out a failure in 100 missions" in text
-    assert (
-        "the difference of a in product would be known to ±0.057 points; with it, to ±0.7" in text
-    )
+    assert "300 missions without a failure do not rule out one in 100 missions" in text
+    assert "the difference of a in product is known to ±0.7" in text
+    assert "without it (Student's t), to ±0.057 points" in text
     unlike = missions.assign(**{PRODUCT: np.random.default_rng(1).random(600)})
     assert summary.allowance_for_difference(compare(unlike, "b", [PRODUCT]), "policy") == ""
 

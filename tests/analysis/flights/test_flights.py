@@ -405,8 +405,8 @@ def route_spots(sea, route):
     return np.concatenate([np.linspace(a, b, 99) for a, b in zip(spots, spots[1:], strict=False)])
 
 
-def test_dess_reads_the_geofence_of_its_own_plan(tmp_path):
-    """Beside the sea of the plan, it closes what that sea has closed, and nothing else."""
+def test_dess_reads_the_geofence_of_its_own_plan(tmp_path, caplog):
+    """Beside the sea of the plan, it closes what that sea has closed, nothing else, and no note."""
     grid = ["........"] * 8
     grid[4] = "...##..#"
     grid[5] = "...#...."
@@ -417,6 +417,7 @@ def test_dess_reads_the_geofence_of_its_own_plan(tmp_path):
     assert len(load_scenario(sea).no_fly) == 4
     again = write_sea(tmp_path, fields='no_fly = "own.plan"\n')
     assert load_scenario(again).no_fly == ((3, 4), (4, 4), (7, 4), (3, 5))
+    assert caplog.text == ""
 
 
 def test_fences_of_others_have_circles_and_what_uavs_stay_in(tmp_path):

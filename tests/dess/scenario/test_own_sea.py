@@ -238,7 +238,9 @@ def test_zones_above_the_uavs_are_told(said, is_told, sea, tmp_path, caplog):
 def test_what_a_file_says_of_extent_and_is_not_read_is_told(sea, tmp_path, caplog):
     lane = feature("LineString", [[-1, 0], [1, 0]], width_m=500, radius=40)
     sea(
-        a_json=collection(lane, feature("Point", [0, 0], Diameter=30, radius=2)),
+        a_json=collection(
+            lane, feature("Point", [0, 0], Diameter=30, radius=2, range_nm=3, orange=1)
+        ),
         b_csv="x,y,radius_m\n3,3,500\n",
         c_txt="........\n" * 6,
         d_json=collection(
@@ -253,7 +255,8 @@ def test_what_a_file_says_of_extent_and_is_not_read_is_told(sea, tmp_path, caplo
     notes = [line.partition(": ")[2].partition(": ")[2] for line in caplog.messages]
     assert [line.replace(f"{tmp_path}/", "") for line in notes] == [
         "a.json is a file of places, for which colours has no effect",
-        "a.json: Diameter, radius, width_m of its places is not read; width and buffer are",
+        "a.json: Diameter, radius, range_nm, width_m of its places is not read; width and buffer "
+        "are",
         "b.csv is a table of cells, for which touched has no effect",
         "b.csv: the column radius is not used, since its places are cells and no degrees",
         "c.txt is a map, for which buffer, width has no effect",

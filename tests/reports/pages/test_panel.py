@@ -471,6 +471,9 @@ def test_prices_are_changed(visit, document):
         records = simulate_batch(space, policies.load("greedy"), SEED, MISSIONS)
         charging = 40 * records.uavs["charged"].sum(axis=1).mean() / 100
         assert cell.startswith(f"{2500 * uavs + 300 * 16 + charging:,.0f} EUR [")
+    tab.locator("[name=a-uavs]").press("ArrowRight")
+    sweep = str(tab.locator("[data-panel=command]").text_content())
+    assert sweep.startswith("dess sweep --set uavs=2 ") and "--price uav=2500 " in sweep
 
 
 def test_numbers_of_other_settings_are_said_to_be_so(visit, document):
