@@ -8,6 +8,7 @@ from dess.model.channel import empty_scratch
 from dess.model.guard import battery, matching, moves, parking, queues, ways
 from dess.model.state import SENSOR, STEP_X, STEP_Y
 from dess.model.ways import Ways
+from dess.physics import chart
 from dess.physics.chart import FAR, distance, is_open
 from dess.policies import heuristics
 
@@ -58,6 +59,15 @@ def distances(chart, x, y, to):
         if is_open(chart.zones, x[row], y[row]):
             found[row] = distance(chart, x[row], y[row], to[row, 0], to[row, 1])
     return found
+
+
+@kernel
+def cost_around(mission, zones, least, closed, start, end, limit):
+    """What the cheapest way of a fast UAV costs around closed cells, the limit at most."""
+    costs = np.full(zones.size, limit, np.int32)
+    costs[closed] = -1
+    table = least.reshape((1, -1))
+    return chart.cost_around(zones, mission, 1, table, 0, costs, *start, *end, limit)
 
 
 def parking_cell(mission, uavs, i, chart, data=1e6):

@@ -35,8 +35,7 @@ from dess.model.record import (
 )
 from dess.model.state import MISSION, SENSOR, UAV, Starts, State
 from dess.model.ways import FAR as _FARTHEST
-from dess.model.ways import relax
-from dess.physics.chart import FAR, Chart, fill_ways
+from dess.physics.chart import FAR, Chart, fill_ways, neighbours_of, spread_costs
 from dess.physics.energy import fill_move_costs
 from dess.physics.landing import is_over
 from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
@@ -83,7 +82,6 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "sizes": (_I8, 1),
     "nearest": (_I4, 2),
     "ways": (_I2, 2),
-    "neighbours": (_I4, 2),
     "batches": (BATCH, 2),  # of ``Scratch``
     "search": (_I8, 2),
     "arrivals": (_F8, 1),
@@ -231,27 +229,28 @@ def prepare(table):
     zones = chart.zones
     ways = chart.ways
     if len(ways) > 0:
-        row_by_row = carray(_pointer(table[_AT.zones]), (zones.size,), _I1)
         ways[:] = FAR
-        neighbours = _array2(table, _AT.neighbours, _I4)
-        fill_ways(row_by_row, neighbours, np.arange(zones.size), ways)
+        fill_ways(zones, np.arange(zones.size), ways)
     mission = _array1(table, _AT.constants, _MISSION)[0]
     mission.pads = _count_pads(mission)  # the pads of several zones may have been changed
     moves = np.zeros((4, *zones.shape), np.int64)
+    by_cell = moves.reshape((4, zones.size))
+    neighbours = neighbours_of(zones)
+    nearest = np.zeros(zones.size, np.int32)
     reach = _array4(table, _AT.reach, _I4)
     home = _array4(table, _AT.ways_home, _I4)[0]
     reach[:] = _FARTHEST
     home[:] = _FARTHEST
+    parking = chart.parking[:, 1] * zones.shape[1] + chart.parking[:, 0]
     for slots in range(1, len(home) + 1):
         fill_move_costs(mission, slots, moves)
-        for number in range(len(chart.parking)):
-            x = chart.parking[number, 0]
-            y = chart.parking[number, 1]
-            home[slots - 1, y, x] = 0
-            if number < len(reach) and slots <= reach.shape[1]:
-                reach[number, slots - 1, y, x] = 0
-                relax(zones, moves, reach[number, slots - 1], False)
-        relax(zones, moves, home[slots - 1], False)
+        if slots <= reach.shape[1]:
+            for number in range(len(reach)):
+                source = parking[number : number + 1]
+                costs = reach[number, slots - 1].reshape(zones.size)
+                spread_costs(neighbours, source, by_cell, False, _FARTHEST, costs, nearest)
+        costs = home[slots - 1].reshape(zones.size)
+        spread_costs(neighbours, parking, by_cell, False, _FARTHEST, costs, nearest)
 
 
 @kernel

@@ -36,7 +36,6 @@ from dess.model.state import (
 )
 from dess.model.view import check_team
 from dess.model.ways import Ways
-from dess.physics.chart import neighbours_of
 from dess.physics.fleet import legs, type_of
 from dess.policies.heuristics import KINDS, plan_circuit
 from dess.scenario.scenario import ScenarioSpace
@@ -226,9 +225,6 @@ def _arrays_of(
     reach = np.zeros((0, 0, 0, 0), np.int32)
     if ways.reach is not None and len(ways.reach):
         reach = ways.reach[0]
-    neighbours = np.zeros((0, 4), np.int32)
-    if chart.ways.size:
-        neighbours = neighbours_of(chart.zones)
     kinds = [KINDS[team[i % len(team)]] for i in range(fleet)]
     arrays = {
         "missions": state.missions,
@@ -244,7 +240,6 @@ def _arrays_of(
         **{name: getattr(world, name) for name in ("nodes", "mean_snr", "order", "means")},
         **{name: getattr(chart, name) for name in ("zones", "parking", "sizes", "nearest")},
         "ways": chart.ways,
-        "neighbours": neighbours,
         **scratch._asdict(),
         "reach": reach,
         "ways_home": ways.home,

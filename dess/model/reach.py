@@ -19,9 +19,18 @@ from dess.model.channel import Link, mean_snr_at
 from dess.model.guard.battery import margin
 from dess.model.state import constants_of, types_of
 from dess.model.ways import FAR as WAYS_FAR
-from dess.model.ways import move_costs, relax
+from dess.model.ways import move_costs
 from dess.physics import fleet
-from dess.physics.chart import FAR, Cell, parking_of, read_only, spread, zones_of
+from dess.physics.chart import (
+    FAR,
+    Cell,
+    neighbours_of,
+    parking_of,
+    read_only,
+    spread,
+    spread_costs,
+    zones_of,
+)
 from dess.physics.energy import ACTIONS, HOVERING, PERCENT, waiting_slot
 from dess.scenario.scenario import ScenarioSpace
 
@@ -144,9 +153,12 @@ def _served(space: ScenarioSpace, is_reached: np.ndarray) -> set[int]:
 
 def _cheapest(zones: np.ndarray, moves: np.ndarray, outward: bool) -> np.ndarray:
     """(H, W) the cheapest ways from some zone to each cell, or from each cell to some zone."""
-    costs = np.where(zones >= 0, 0, WAYS_FAR).astype(np.int32)
-    relax(read_only(zones), moves, costs, outward)
-    return np.where(costs == WAYS_FAR, math.inf, costs)
+    costs = np.full(zones.size, WAYS_FAR, np.int32)
+    nearest = np.zeros(zones.size, np.int32)
+    sources = np.flatnonzero(zones >= 0)
+    table = moves.reshape(len(moves), -1)
+    spread_costs(neighbours_of(zones), sources, table, outward, WAYS_FAR, costs, nearest)
+    return np.where(costs == WAYS_FAR, math.inf, costs).reshape(zones.shape)
 
 
 def _slots_of_trips(space: ScenarioSpace, uav: int) -> np.ndarray:

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from dess.base.kernels import inlined, kernel
+from dess.base.kernels import inlined
 from dess.model.state import ENERGY_PART, part_of
-from dess.physics.chart import NO_FLY, Chart, read_only
+from dess.physics.chart import Chart, neighbours_of, read_only, spread_costs
 from dess.physics.energy import ACTIONS, HOVERING, fill_move_costs
 
 FAR = 2**30  # further than any cell
@@ -96,13 +96,14 @@ def _filled(
     if groups * slowest * cells.size > MOST_ENTRIES:
         return read_only(np.zeros((groups, 0, 0, 0), np.int32))
     mission = np.frombuffer(energy, ENERGY_PART)[0]
-    table = np.full((groups, slowest, *shape), FAR, np.int32)
+    table = np.full((groups, slowest, cells.size), FAR, np.int32)
+    neighbours, nearest = neighbours_of(cells), np.zeros(cells.size, np.int32)
+    homes = np.frombuffer(parking, np.int64).reshape(groups, -1, 2)
     for s in range(slowest):
-        moves = move_costs(mission, s + 1, shape)
-        for group, homes in enumerate(np.frombuffer(parking, np.int64).reshape(groups, -1, 2)):
-            table[group, s, homes[:, 1], homes[:, 0]] = 0
-            relax(cells, moves, table[group, s], False)
-    return read_only(table)
+        moves = move_costs(mission, s + 1, shape).reshape(HOVERING, -1)
+        for group, numbers in enumerate(homes[:, :, 1] * shape[1] + homes[:, :, 0]):
+            spread_costs(neighbours, numbers, moves, False, FAR, table[group, s], nearest)
+    return read_only(table.reshape(groups, slowest, *shape))
 
 
 def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) -> np.ndarray:
@@ -114,50 +115,3 @@ def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) ->
         costs = mission["slot_costs"].reshape(-1, ACTIONS)[slots_per_cell - 1, :HOVERING]
         moves[:] = slots_per_cell * costs.astype(np.int64)[:, None, None]
     return moves
-
-
-@kernel
-def relax(zones, moves, costs, outward):
-    """Lower the costs of all cells to those of the cheapest ways.
-
-    A cell whose cost has been lowered is put into a queue, and its neighbours are looked at when it
-    comes out (Moore's algorithm). Most cells come there once, since ways of few cells cost least.
-
-    Args:
-        zones: (H, W) as in ``Chart``.
-        moves: (4, H, W) what the moves north, east, south and west into a cell cost.
-        costs: (H, W) the costs; 0 where the ways end and ``FAR`` elsewhere.
-        outward: Whether the ways lead from there to the cells, and not back.
-    """
-    rows, columns = zones.shape
-    queue = np.empty(zones.size, np.int32)
-    waits = np.zeros(zones.size, np.bool_)
-    first, count = 0, 0
-    for cell in range(zones.size):
-        if costs[cell // columns, cell % columns] == 0:
-            queue[count] = cell
-            waits[cell] = True
-            count += 1
-    while count > 0:
-        cell = queue[first]
-        first = first + 1 if first + 1 < zones.size else 0
-        count -= 1
-        waits[cell] = False
-        y = cell // columns
-        x = cell - y * columns
-        for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-            a = x + step_x if outward else x - step_x
-            b = y + step_y if outward else y - step_y
-            if not (0 <= a < columns and 0 <= b < rows) or zones[b, a] == NO_FLY:
-                continue
-            move = moves[action, b, a] if outward else moves[action, y, x]
-            cost = min(costs[y, x] + move, FAR - 1)
-            if cost >= costs[b, a]:
-                continue
-            costs[b, a] = cost
-            beside = b * columns + a
-            if not waits[beside]:
-                waits[beside] = True
-                last = first + count
-                queue[last if last < zones.size else last - zones.size] = beside
-                count += 1

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
+from dess.physics.energy import move_cost
 
 Cell = tuple[int, int]
 Rectangle = tuple[int, int, int, int]  # x, y, width and height
@@ -22,6 +23,8 @@ Rectangle = tuple[int, int, int, int]  # x, y, width and height
 OPEN = -1
 NO_FLY = -2
 FAR = 2**15 - 1  # [cells]: there is no way
+
+_STEPS = ((0, -1), (1, 0), (0, 1), (-1, 0))  # to the cells north, east, south and west
 
 # The most cells of a grid of which the ways between all are kept: 200 MB.
 MOST_CHARTED = 10_000
@@ -80,7 +83,7 @@ def zones_of(
     cells[y, x] = NO_FLY
     for number, (left, top, columns, rows) in enumerate(zones):
         cells[top : top + rows, left : left + columns] = number
-    return cells
+    return read_only(cells)
 
 
 def parking_of(zones: Iterable[Rectangle]) -> list[Cell]:
@@ -115,7 +118,7 @@ def chart_at(
         rows[[y * width + x for x, y in places]] = np.arange(len(places))
     ways = np.full((len(places), cells.size), FAR, np.int16)
     numbers = np.array([y * width + x for x, y in places])
-    fill_ways(cells.reshape(-1), neighbours_of(cells), numbers, ways)
+    fill_ways(cells, numbers, ways)
     return _chart_of(cells, parking, sizes, nearest, ways, rows)
 
 
@@ -150,54 +153,98 @@ def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarr
     cells = sources[:, 1] * zones.shape[1] + sources[:, 0]
     is_open = zones.reshape(-1)[cells] != NO_FLY
     nearest[cells[is_open]] = np.flatnonzero(is_open)
-    _spread(neighbours_of(zones), cells[is_open], lengths, nearest)
+    spread_costs(neighbours_of(zones), cells[is_open], None, True, FAR, lengths, nearest)
     return lengths, nearest
 
 
-def neighbours_of(zones: np.ndarray) -> np.ndarray:
+@kernel
+def neighbours_of(zones):
     """(H * W, 4) the numbers of the cells north, east, south and west of a cell; -1 where none."""
-    cells = np.full(np.add(zones.shape, 2), -1, np.int32)
-    cells[1:-1, 1:-1] = np.where(zones == NO_FLY, -1, np.arange(zones.size).reshape(zones.shape))
-    around = cells[:-2, 1:-1], cells[1:-1, 2:], cells[2:, 1:-1], cells[1:-1, :-2]
-    return np.stack(around, -1).reshape(-1, 4)
+    height, width = zones.shape
+    neighbours = np.full((zones.size, 4), -1, np.int32)
+    for y in range(height):
+        for x in range(width):
+            for side, (step_x, step_y) in enumerate(_STEPS):
+                to_x = x + step_x
+                to_y = y + step_y
+                if is_open(zones, to_x, to_y):
+                    neighbours[y * width + x, side] = to_y * width + to_x
+    return neighbours
 
 
 @kernel
-def _spread(neighbours, sources, lengths, nearest):
-    queue = np.empty(len(lengths), np.int32)
-    first = 0
+def spread_costs(neighbours, sources, moves, outward, far, costs, nearest):
+    """Lower the costs of cells to those of the cheapest ways between them and the nearest source.
+
+    The cells are looked at in the order in which they are first reached, and all of them again
+    where a cost has been lowered later. Where moves cost one, this is a breadth-first search.
+
+    Args:
+        neighbours: As ``neighbours_of``.
+        sources: (S,) the numbers of cells.
+        moves: (4, W * H) what the moves north, east, south and west into a cell cost; None if each
+            costs one.
+        outward: Whether the ways lead from the sources to the cells, and not back.
+        far: More than any way costs.
+        costs: (W * H,) the costs; ``far`` before, and where there is no way.
+        nearest: (W * H,) the number that the nearest source has in ``nearest``; where moves cost
+            one, the first source on a tie.
+    """
+    queue = np.empty(len(costs), np.int32)
     last = len(sources)
     for number in range(last):
         queue[number] = sources[number]
-        lengths[sources[number]] = 0
-    while first < last:
-        cell = queue[first]
-        first += 1
-        for side in range(4):
-            to = neighbours[cell, side]
-            if to >= 0 and lengths[to] == FAR:
-                queue[last] = to
-                lengths[to] = lengths[cell] + 1
-                nearest[to] = nearest[cell]
-                last += 1
+        costs[sources[number]] = 0
+    is_lowered = True
+    while is_lowered:
+        is_lowered = False
+        first = 0
+        while first < last:
+            cell = queue[first]
+            first += 1
+            spent = np.int64(costs[cell])
+            source = nearest[cell]
+            for side in range(4):
+                to = neighbours[cell, side]
+                if to < 0:
+                    continue
+                if outward:
+                    cost = spent + _listed_cost(moves, side, to)
+                else:
+                    cost = spent + _listed_cost(moves, (side + 2) % 4, cell)
+                if cost >= costs[to]:
+                    continue
+                if costs[to] == far:
+                    queue[last] = to
+                    last += 1
+                else:
+                    is_lowered = True
+                costs[to] = cost
+                nearest[to] = source
+
+
+@inlined
+def _listed_cost(moves, action, cell):
+    if moves is None:
+        return 1
+    return moves[action, cell]
 
 
 @kernel
-def fill_ways(zones, neighbours, places, ways):
+def fill_ways(zones, places, ways):
     """Write the ways from these cells to all others, where ``FAR`` stands before, row by row."""
-    nearest = np.zeros(len(zones), np.int32)
+    width = zones.shape[1]
+    neighbours = neighbours_of(zones)
+    nearest = np.zeros(zones.size, np.int32)
     for number in range(len(places)):
-        if zones[places[number]] != NO_FLY:
-            _spread(neighbours, places[number : number + 1], ways[number], nearest)
+        if zones[places[number] // width, places[number] % width] != NO_FLY:
+            source = places[number : number + 1]
+            spread_costs(neighbours, source, None, True, FAR, ways[number], nearest)
 
 
 @shared_kernel
 def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
     """The cells on the shortest way between two cells that avoids closed cells, or ``FAR``.
-
-    This is A*. The way without closed cells is a lower bound, which each step from a cell keeps or
-    misses by two cells. So the next cell is the last of ``near`` while there is one, and few cells
-    beside the way are looked at.
 
     Args:
         zones, ways, rows: As in ``Chart``.
@@ -205,52 +252,115 @@ def length_around(zones, ways, rows, closed, x, y, to_x, to_y):
         x, y: Where the way begins.
         to_x, to_y: Where it ends.
     """
-    height, width = zones.shape
+    row = -1
+    if ways.size > 0:
+        row = to_y * zones.shape[1] + to_x
+        if rows is not None:
+            row = rows[row]
     lengths = np.full(zones.size, FAR, np.int16)
     lengths[closed] = -1
-    near, far = np.empty(zones.size, np.int64), np.empty(zones.size, np.int64)
+    return cost_around(zones, None, 1, ways, row, lengths, x, y, to_x, to_y, FAR)
+
+
+@shared_kernel
+def cost_around(zones, mission, slots, least, row, costs, x, y, to_x, to_y, limit):
+    """The cost of the cheapest way between two cells around closed cells, or a limit if it is less.
+
+    This is A*. The cost without closed cells is a lower bound, and the next cell is one with the
+    lowest bound: the last of ``near`` while there is one. So few cells beside the way are looked
+    at.
+
+    Args:
+        zones: As in ``Chart``.
+        mission: ``MISSION`` record, whose moves cost battery [% / 1000]; None to count cells.
+        slots: The slots that the UAV takes for a cell.
+        least: (R, W * H) rows of the costs to a cell without closed cells.
+        row: That of the last cell; with -1, the cells along both axes are in its place.
+        costs: (W * H,) -1 for closed cells, the limit for others; overwritten.
+        x, y: Where the way begins.
+        to_x, to_y: Where it ends.
+        limit: The limit.
+    """
+    height, width = zones.shape
+    places = np.empty((2, 4 * zones.size), np.int32)  # each neighbour of a cell may put it there
+    near, far = places[0], places[1]
     near[0] = y * width + x
-    nears = 1
-    fars = 0
-    lengths[near[0]] = 0
-    bound = _at_least(ways, rows, width, x, y, to_x, to_y)
-    while nears + fars > 0:
+    nears, fars = 1, 0
+    costs[near[0]] = 0
+    bound = _at_least(least, row, x, y, to_x, to_y, width)
+    while bound < limit:
         if nears == 0:
-            near, far, nears, fars, bound = far, near, fars, 0, bound + 2
+            nears, fars, bound = _raise_bound(
+                least, row, costs, near, far, fars, to_x, to_y, width, bound, limit
+            )
+            continue
         nears -= 1
-        x = near[nears] % width
-        y = near[nears] // width
-        length = lengths[near[nears]]
-        left = _at_least(ways, rows, width, x, y, to_x, to_y)
+        cell = np.int64(near[nears])
+        x = cell % width
+        y = cell // width
+        cost = np.int64(costs[cell])
+        left = _at_least(least, row, x, y, to_x, to_y, width)
         if left == 0:
-            return np.int64(length)
-        if length + left < bound:
-            continue  # a shorter way to this cell has been found since it was put there
-        for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
+            return cost
+        if cost + left < bound:
+            continue  # a cheaper way to this cell has been found since it was put there
+        for action, (step_x, step_y) in enumerate(_STEPS):
             next_x = x + step_x
             next_y = y + step_y
             if not (0 <= next_x < width and 0 <= next_y < height):
                 continue
             to = next_y * width + next_x
-            if zones[next_y, next_x] == NO_FLY or length + 1 >= lengths[to]:
+            if zones[next_y, next_x] == NO_FLY:
                 continue
-            lengths[to] = length + 1
-            if _at_least(ways, rows, width, next_x, next_y, to_x, to_y) < left:
+            next_cost = cost + _cost_of_move(mission, slots, action, next_x, next_y)
+            if next_cost >= costs[to]:
+                continue
+            costs[to] = next_cost
+            if next_cost + _at_least(least, row, next_x, next_y, to_x, to_y, width) <= bound:
                 near[nears] = to
                 nears += 1
             else:
                 far[fars] = to
                 fars += 1
-    return np.int64(FAR)
+    return np.int64(limit)
+
+
+@shared_kernel
+def _raise_bound(least, row, costs, near, far, fars, to_x, to_y, width, bound, limit):
+    """Move the cells with the next bound from ``far`` to ``near``; return both numbers and it."""
+    raised = np.int64(limit)
+    for place in range(fars):
+        cell = np.int64(far[place])
+        total = costs[cell] + _at_least(least, row, cell % width, cell // width, to_x, to_y, width)
+        if bound < total < raised:
+            raised = total
+    nears = 0
+    left = 0
+    for place in range(fars):
+        cell = np.int64(far[place])
+        total = costs[cell] + _at_least(least, row, cell % width, cell // width, to_x, to_y, width)
+        if total == raised:
+            near[nears] = cell
+            nears += 1
+        elif total > raised:
+            far[left] = cell
+            left += 1
+    return nears, left, raised
 
 
 @inlined
-def _at_least(ways, rows, width, x, y, to_x, to_y):
-    """The cells on the way between two cells or, on a large grid, a lower bound of them."""
-    if ways.size == 0 or (rows is not None and rows[to_y * width + to_x] < 0):
-        return abs(x - to_x) + abs(y - to_y)
-    to = to_y * width + to_x
-    return np.int64(ways[to if rows is None else rows[to], y * width + x])
+def _cost_of_move(mission, slots, action, x, y):
+    if mission is None:
+        return 1
+    return move_cost(mission, slots, action, x, y)
+
+
+@inlined
+def _at_least(least, row, x, y, to_x, to_y, width):
+    """A lower bound of the cost from a cell to the last cell of a way."""
+    if row < 0:
+        return np.int64(abs(x - to_x) + abs(y - to_y))
+    return np.int64(least[row, y * width + x])
 
 
 @inlined

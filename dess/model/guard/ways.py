@@ -1,16 +1,14 @@
 """The ways to a charging zone around parked teammates, and the battery that they take."""
 
-import heapq
-
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import cannot_leave, ends_soon, usable_battery
-from dess.model.state import EAST, NORTH, SOUTH, STEP_X, STEP_Y, WEST
-from dess.model.ways import FAR, is_calm
+from dess.model.state import EAST, NORTH, SOUTH, WEST
+from dess.model.ways import is_calm
 from dess.physics.charging import longest_charge
-from dess.physics.chart import distance, is_open, length_around
-from dess.physics.energy import PERCENT, dearest_slot, has_costs, move_cost, slot_cost, waiting_slot
+from dess.physics.chart import cost_around, distance, length_around
+from dess.physics.energy import PERCENT, dearest_slot, has_costs, slot_cost, waiting_slot
 from dess.physics.landing import lands
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
@@ -164,8 +162,7 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
     ``battery_home`` takes the detour of the shortest ways around closed cells, and the battery of
     the cheapest way, which may be another. By this, each cell of two may seem to be on the better
     way, and a UAV flies to and fro between them. Here the cheapest way around all closed cells is
-    found, by A*: the battery without closed cells is a lower bound. The arguments are those of
-    ``battery_home``.
+    found. The arguments are those of ``battery_home``.
     """
     if reach is None or reach.size == 0:
         return np.int64(battery_home(mission, uavs, i, chart, planned, x, y, home, reach))
@@ -173,34 +170,13 @@ def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
         closed = _closed_cells(mission, uavs, i, chart, planned, home.x, home.y)
     else:
         closed = _closed_cells(mission, uavs, i, chart, None, home.x, home.y)
-    width, slots = chart.zones.shape[1], uavs[i].slots_per_cell
-    least = reach[mission.energy, chart.nearest[home.y, home.x], slots - 1].ravel()
-    start = np.int64(y * width + x)
+    slots = uavs[i].slots_per_cell
+    least = reach[mission.energy, chart.nearest[home.y, home.x], slots - 1].reshape((1, -1))
     waits = waiting_slot(mission) * longest_charge(mission, uavs)
-    through = np.int64(least[start]) + waits
-    spent = np.full(chart.zones.size, FAR, np.int64)
-    spent[closed] = -1
-    spent[start] = 0
-    # Of cells with equal bounds, the one that is nearest to the parking cell comes first.
-    bounds = [(np.int64(least[start]), np.int64(least[start]), start)]
-    while bounds:
-        bound, left, cell = heapq.heappop(bounds)
-        if left == 0 or bound >= through:
-            return min(bound, through)
-        if bound > spent[cell] + left:
-            continue  # a cheaper way to this cell has been found since it was put there
-        for action in range(4):
-            next_x = cell % width + STEP_X[action]
-            next_y = cell // width + STEP_Y[action]
-            if not is_open(chart.zones, next_x, next_y):
-                continue
-            to = next_y * width + next_x
-            cost = spent[cell] + move_cost(mission, slots, action, next_x, next_y)
-            if cost < spent[to]:
-                spent[to] = cost
-                left = np.int64(least[to])
-                heapq.heappush(bounds, (cost + left, left, np.int64(to)))
-    return through
+    through = np.int64(least[0, y * chart.zones.shape[1] + x]) + waits
+    costs = np.full(chart.zones.size, through, np.int32)
+    costs[closed] = -1
+    return cost_around(chart.zones, mission, slots, least, 0, costs, x, y, home.x, home.y, through)
 
 
 @inlined

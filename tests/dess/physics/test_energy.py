@@ -14,9 +14,10 @@ from dess.model.guard import guard
 from dess.model.state import BATTERY, LANDED, constants_of
 from dess.model.view import View
 from dess.model.ways import FAR, Ways, move_costs
-from dess.physics.chart import parking_of
+from dess.physics.chart import NO_FLY, neighbours_of, parking_of, read_only, spread_costs
 from dess.physics.energy import Wind
 from dess.scenario.scenario import ScenarioSpace
+from tests import compiled
 from tests.dess.model.flights import batteries, flown
 from tests.drawn import random_actions, reached, replications, seeds, spaces
 
@@ -82,6 +83,33 @@ def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(spa
         wanted = 0 if (x, y) == home else min(neighbours, default=FAR)
         assert reach[0, number, s - 1, y, x] == wanted
         assert ways.home[0, s - 1, y, x] <= wanted
+
+
+@given(spaces(), WINDS | COSTS_OF_SLOTS, seeds)
+def test_a_way_around_closed_cells_costs_as_much_as_around_no_fly_cells(space, energy, seed):
+    space = ScenarioSpace.of(space, **energy)
+    mission, zones, draws = constants_of(space)[0], space.chart.zones, np.random.default_rng(seed)
+    moves = move_costs(mission, 1, zones.shape).reshape(4, -1)
+    end = parking_of(space.rectangles)[0]
+    least = _costs_to(zones, moves, end)
+    water = reached(end, *space.size, {*space.no_fly})
+    for limit in (2_000, 10_000, 10**6):
+        closed = [cell for cell in water if cell != end and draws.random() < 0.3]
+        numbers = np.array([zones.shape[1] * y + x for x, y in closed], np.int64)
+        fewer = zones.copy()
+        fewer.reshape(-1)[numbers] = NO_FLY
+        wanted = np.minimum(_costs_to(fewer, moves, end), limit)
+        for start in {*water} - {*closed}:
+            found = compiled.cost_around(mission, zones, least, numbers, start, end, limit)
+            assert found == wanted[start[::-1]]
+
+
+def _costs_to(zones, moves, end):
+    """(H, W) what the cheapest ways to a cell cost."""
+    costs, nearest = np.full(zones.size, FAR, np.int32), np.zeros(zones.size, np.int32)
+    source = np.array([zones.shape[1] * end[1] + end[0]])
+    spread_costs(neighbours_of(read_only(zones)), source, moves, False, FAR, costs, nearest)
+    return costs.reshape(zones.shape)
 
 
 def test_home_counts_the_thousandths_of_the_way_and_what_has_been_spent():
