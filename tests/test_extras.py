@@ -104,7 +104,7 @@ def test_a_plain_installation_has_the_simulator_and_its_commands(folder, plain):
 @pytest.mark.brief
 def test_a_sweep_answers_without_its_page(plain):
     _, out, err = plain[next(line for line in ANSWERED if line.startswith("sweep"))]
-    assert "rank" in out and "page: " not in out
+    assert "settings by product" in out and "page: " not in out
     assert err.splitlines()[-1].startswith("no page: the page of a sweep needs ")
     assert err.endswith(": pip install '.[reports]' -c constraints.txt")
 
