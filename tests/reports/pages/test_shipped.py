@@ -22,8 +22,11 @@ from tests.reports.small import EMBEDDED, Links, run_small_studies, said_by, wor
 
 pytestmark = pytest.mark.slow
 
-# Parameters of what would take long: missions of questions, and what own-sea requires.
+# Parameters of what would take long: missions of questions, and what own-sea requires and pays. At
+# its price, a UAV that may be lost would ask for thousands of missions.
 QUICK: dict[str, Any] = {"missions": 40, "requirements": {"success": 0.9}}
+QUICK["prices"] = {"uav": 20_000, "pad": 10_000, "charge": 2, "hour": 100, "slot_seconds": 60}
+QUICK["prices"]["lost_uav"] = 100
 # The width of the text on A4 [px], and the elements that reach beyond a width.
 A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
