@@ -69,8 +69,8 @@ _VERDICTS = {
 _MOST_NAMED = 2  # the largest number of changed fields that a headline names
 SIDES = ("baseline", "variation")
 _MARKED = (
-    "▲ higher in the variation, ▼ lower, △ and ▽ the same in what was seen, where a rare failure "
-    "is not ruled out, ≈ inconclusive"
+    "▲ higher in the variation, ▼ lower, △ higher and ▽ lower in what was seen, where a rare "
+    "failure is not ruled out, ≈ inconclusive"
 )
 
 # Further quantities per mission, in addition to the paper's metrics.

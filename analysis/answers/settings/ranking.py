@@ -309,7 +309,7 @@ def ranked_table(results: Results, rows: pd.DataFrame, metric: str) -> Table:
         f"{intervals_in_words(results)}; ≈: may be the best"
     )
     if (top["standing"] == SEEN_WORSE).any():
-        caption += f"; {MARKS[SEEN_BELOW]}: not in what was seen, where {NOT_RULED_OUT}"
+        caption += f"; {MARKS[SEEN_BELOW]}: worse in what was seen, where {NOT_RULED_OUT}"
     return Table(cells, caption, rows)
 
 
