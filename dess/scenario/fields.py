@@ -406,12 +406,30 @@ class Fields(Strict):
 
     @property
     def node_data(self) -> tuple[tuple[float, float], ...]:
-        """The range of the initial data of each node [data units]."""
+        """The range of the initial data of each node [data units].
+
+        Of a node that was idle before the mission they are what it has on average.
+        """
         if self.arrivals.initial:
-            return tuple((amount, amount) for amount in self.arrivals.initial)
-        low, high = self.initial_data
-        merged = self.arrivals.merged or (1,) * len(self.nodes)
-        return tuple((low * count, high * count) for count in merged)
+            ranges = [(amount, amount) for amount in self.arrivals.initial]
+        else:
+            low, high = self.initial_data
+            merged = self.arrivals.merged or (1,) * len(self.nodes)
+            ranges = [(low * count, high * count) for count in merged]
+        idle = self.idle_slots
+        if not idle:
+            return tuple(ranges)
+        collected = [rate * idle for rate in self.node_rates]
+        return tuple(
+            (low + more, high + more) for (low, high), more in zip(ranges, collected, strict=True)
+        )
+
+    @property
+    def idle_slots(self) -> float:
+        """How long nodes have collected data before the mission [slots]; 0 without a data sheet."""
+        if not self.data_sheet.is_on:
+            return 0.0
+        return self.data_sheet.number("idle") / self.data_sheet.units.slot
 
     def value(self, field: str) -> Any:
         """The value of a field; ``failures.uav_rate`` is the field of a section."""

@@ -60,6 +60,8 @@ SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
+_CRUISE = "data_sheet.cruise"
+
 # The context of a scenario whose cells may be where they must not be.
 DRAFT = "draft"
 
@@ -276,7 +278,7 @@ def _of_values(
 ) -> ScenarioSpace:
     """The scenario of the values that its file has, and of those that replace them."""
     read.pop("description", None)
-    values = merged(read, overrides)
+    values = merged(merged(read, overrides), _kept_at_another_cruise(read, overrides, where))
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         beside = partial(_SCENARIOS.beside, name_or_path)
@@ -292,6 +294,27 @@ def _of_values(
     if not is_scenario_name(str(name_or_path)) and distance_error(space) >= TOLD_ERROR:
         tell(f"{where}: {distance_sentence(space)}")
     return space
+
+
+def _kept_at_another_cruise(
+    read: Mapping[str, Any], overrides: Mapping[str, Any], where: str
+) -> dict[str, Any]:
+    """What a data sheet keeps where another cruise replaces that of its file.
+
+    The cell stays, and the endurance is still that of the cruise of the file.
+    """
+    replaced = dotted(dict(overrides))
+    others = {field: value for field, value in replaced.items() if field != _CRUISE}
+    sheet = merged(dict(read), others).get("data_sheet")
+    if _CRUISE not in replaced or not (isinstance(sheet, dict) and sheet.get("cruise")):
+        return {}
+    of_file = validated(DataSheet, sheet, where)
+    kept = {}
+    if not of_file.cell:
+        kept["data_sheet.cell"] = f"{of_file.units.cell!r} m"
+    if "data_sheet.endurance" not in replaced and " at " not in (of_file.endurance or ""):
+        kept["data_sheet.endurance"] = f"{of_file.endurance} at {of_file.cruise}"
+    return kept
 
 
 def positions_in(name_or_path: str | Path, /, **overrides: Any) -> Positions:

@@ -32,8 +32,8 @@ MOST_REPAIR = 1e6  # the longest repairs [slots]
 
 # From what in the sheet a field of the scenario follows; each is refused in the words of the sheet.
 _ORIGINS = {
-    "cell_size": ("endurance", "cruise"),
-    "charge_rate": ("endurance", "charging"),
+    "cell_size": ("cell", "endurance", "cruise"),
+    "charge_rate": ("cell", "endurance", "charging"),
     "arrival_rate": ("data_rate", "bandwidth"),
     "arrivals.rates": ("data_rate", "bandwidth"),
     "arrivals.message": ("message", "endurance", "bandwidth"),

@@ -1,0 +1,95 @@
+"""Years at sea, many together: each place of a batch flies the windows of a year one by one.
+
+    years = Years(campaigns, world)
+    years.run(team, records)      # row b is the year of campaigns[b]
+
+A window is a mission of its own weather, so each place has its own table of ways. When a window
+ends, the next one of the same year takes its place (``dess.model.campaign``). Fleets and years that
+share a sea are advanced in lockstep, as the missions of ``simulate_batch`` are.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from dess.base.kernels import kernel
+from dess.model import rules
+from dess.model.campaign import Campaign
+from dess.model.channel import World, empty_scratch
+from dess.model.record import Records, empty_records, write_records
+from dess.model.state import starts_of, state_of
+from dess.model.view import decide
+from dess.model.ways import WaysOfPlaces
+from dess.physics.fleet import slowest
+from dess.physics.landing import is_over
+
+
+class Years:
+    """Years of fleets that share a sea, each at a place of a batch."""
+
+    def __init__(self, campaigns: Sequence[Campaign], world: World):
+        """Prepare a place for each campaign; none of them has begun."""
+        spaces = [campaign.space for campaign in campaigns]
+        self.campaigns, self.world = campaigns, world
+        self.state = state_of(spaces, len(spaces))
+        self.starts = starts_of(spaces)
+        uavs, nodes = self.state.uavs.shape[1], len(world.nodes)
+        self.scratch = empty_scratch(uavs, nodes)
+        speeds = max(slowest(space.fleet) for space in spaces)
+        self.ways = WaysOfPlaces(len(spaces), speeds, world.chart)
+        self.window = empty_records(1, uavs, True, nodes)
+        self.has_window = np.zeros(len(spaces), np.bool_)
+
+    def run(
+        self,
+        team: Sequence[Any],
+        records: Records,
+        progress: Callable[[int], object] | None = None,
+    ) -> None:
+        """Simulate all years with the policies of a team, and write their records."""
+        for b in range(len(self.campaigns)):
+            self._begin_window(b, records)
+        shown = self.world.shown()
+        while self.has_window.any():
+            decide(team, self.state, shown, self.ways)  # type: ignore[arg-type]
+            for b in _advance(self.has_window, self.state, self.world, self.scratch):
+                self._end_window(b)
+                self._begin_window(b, records)
+                if progress and not self.has_window[b]:
+                    progress(1)
+
+    def _begin_window(self, b: int, records: Records) -> None:
+        """Launch the next window of a place, or end its year."""
+        campaign = self.campaigns[b]
+        number = campaign.begin_window(self.starts, b)
+        self.has_window[b] = number >= 0
+        if number < 0:
+            self.state.missions["active"][b] = 0
+            campaign.end_year(records, b)
+            return
+        self.ways.fill(b, self.starts.constants[b : b + 1])
+        _launch(self.state, b, self.starts, number)
+
+    def _end_window(self, b: int) -> None:
+        write_records(np.array([b]), self.state, self.ways.home, self.window)
+        self.campaigns[b].end_window(self.window.mission(0), self.state, b)
+
+
+@kernel
+def _launch(state, b, starts, number):
+    rules.launch(state, b, starts, b, number)
+
+
+@kernel
+def _advance(has_window, state, world, scratch):
+    """Advance every mission by one slot; return the places whose windows have ended."""
+    ended = np.empty(len(has_window), np.int64)
+    count = 0
+    for b in range(len(has_window)):
+        if has_window[b]:
+            rules.run_slot(state, b, world, scratch)
+            if is_over(state.missions[b]):
+                ended[count] = b
+                count += 1
+    return ended[:count]
