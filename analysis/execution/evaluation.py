@@ -40,7 +40,14 @@ from dess.analysis.stats.weights import moments_of_space
 from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
 from dess.model.processes import load_processes
-from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.model.record import (
+    MISSION_RECORD,
+    NODE_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    YEAR_OPERATIONS,
+    Records,
+)
 from dess.model.state import check_seed, spaces_of
 from dess.model.view import check_team
 from dess.physics.streams import MAX_REPLICATION
@@ -195,7 +202,7 @@ def of_results(results: Results) -> list[Evaluation]:
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
         metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in recorded_metrics()}
-        measured = [name for name in OPERATIONS.names or () if name in rows]
+        measured = [name for name in YEAR_OPERATIONS.names or () if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             if name not in NODES_BEHIND:
                 metrics[name] = rows[name].to_numpy(float)
@@ -255,7 +262,7 @@ def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarr
     """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in recorded_metrics()}
     if len(records.operations):
-        values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
+        values |= {n: records.operations[n] for n in records.operations.dtype.names or ()}
     if space.units:
         values |= columns_in_units(values, space.units)
     metrics: dict[Key, np.ndarray] = {m: column.astype(float) for m, column in values.items()}
@@ -325,7 +332,7 @@ def _simulate_pieces(
     pool = Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
     if asked.engine == "batch":
-        simulate_batch(*about, 1)  # compiles
+        simulate_batch(about[0].without_weather(), *about[1:], 1)  # compiles
     else:
         first = _event_jobs(asked, range(1))
         _results_in_order(

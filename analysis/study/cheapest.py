@@ -191,7 +191,13 @@ class Setting(NamedTuple):
 
 
 def horizon_of(space: ScenarioSpace) -> float:
-    """The largest age that data can have [h with a data sheet, otherwise slots]."""
+    """What tolerances of ages are shares of: the length of a mission, or a day in years.
+
+    Returns:
+        It is in hours with a data sheet, otherwise in slots.
+    """
+    if space.weather.is_on:
+        return 24.0
     return space.max_slots * (size_of("h", space.units) if space.units else 1)
 
 

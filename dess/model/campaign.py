@@ -1,21 +1,24 @@
 """A year at sea: the windows of weather that a fleet flies, and what it carries from one to the next.
 
-    campaign = Campaign(plan, space, seed, replication)
+    campaign = Campaign(space, seed, replication)
     while campaign.begin_window(starts, b) >= 0:   # writes what mission b starts from
         ...                                        # launch it, and run it to its end
         campaign.end_window(record, state, b)      # takes what it ends with
-    campaign.write_record(records, row)
+    campaign.end_year(records, row)
 
 A window is a mission that begins with the data, ages, batteries and failures with which the one
 before it has ended, and with what has come in between. The times of a campaign are whole
 milliseconds from the beginning of its year, those of a window are its mission slots.
 """
 
+from collections.abc import Iterable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from dess.base.elementary import exp, log
+from dess.base.errors import InputError
 from dess.base.kernels import inlined, kernel
 from dess.model.record import UAV_RECORD, MissionRecord, Records
 from dess.model.rules import draw_idle_data
@@ -24,13 +27,18 @@ from dess.physics import streams
 from dess.physics.charging import charge_limit, charged_after, slots_to_charge
 from dess.physics.energy import ACTIONS, SPEEDS
 from dess.physics.fleet import slowest
+from dess.scenario.fields import SAMPLED
+from dess.scenario.quantities import measured
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather.hours import State as HourState
+from dess.scenario.weather.hours import Year, hours_of, years
+from dess.scenario.weather.windows import windows_of
 
 HOUR = 3_600_000  # [ms]
 MOST_HOURS = 16_384  # of a year, in the numbers of the replications of its windows
 
 
-class Window(NamedTuple):
+class YearWindow(NamedTuple):
     """A run of open hours in which UAVs may fly.
 
     Attributes:
@@ -58,7 +66,7 @@ class YearPlan(NamedTuple):
     year: int
     hours: int
     operating: int
-    windows: list[Window]
+    windows: list[YearWindow]
 
     @property
     def open_share(self) -> float:
@@ -71,6 +79,50 @@ class YearPlan(NamedTuple):
         ends = [0, *(window.first + window.hours for window in self.windows)]
         begins = [*(window.first for window in self.windows), self.hours]
         return max(begin - end for begin, end in zip(begins, ends, strict=True))
+
+
+@lru_cache(maxsize=64)
+def plan_of(space: ScenarioSpace, year: Year) -> YearPlan:
+    """What the weather of a year lets the fleet of a scenario do."""
+    assert space.units
+    hours = hours_of(space)
+    state = hours.state[year.first : year.first + year.hours]
+    longest = space.weather.longest_hours
+    windows = [
+        YearWindow(first - year.first, count, hours.costs[first : first + count].max(axis=0))
+        for first, count in windows_of(hours, year, longest, space.units.slot)
+    ]
+    operating = int((state != HourState.NIGHT).sum())
+    return YearPlan(year.year, year.hours, operating, windows)
+
+
+def check_years(spaces: Iterable[ScenarioSpace], replications: np.ndarray) -> None:
+    """Refuse replications that are years which the weather of a scenario does not have.
+
+    Raises:
+        InputError: If there are fewer whole years, or if fleets or batteries are drawn at random.
+    """
+    for space in spaces:
+        if not space.weather.is_on:
+            continue
+        for name in SAMPLED:
+            low, high = getattr(space, name)
+            if low != high:
+                raise InputError(name, f"[{low}, {high}] is drawn", "one number, with weather")
+        whole = len(years(hours_of(space)))
+        if len(replications) and replications.max() >= whole:
+            problem = f"{replications.max() + 1} years are asked for"
+            raise InputError("years", problem, f"{whole} at most, the whole ones of the weather")
+
+
+def years_of(space: ScenarioSpace, seed: int) -> list[Year]:
+    """The whole years of the weather of a scenario, in the order of their replications.
+
+    The order is drawn by the seed, so that a few of them are a sample of all.
+    """
+    whole = years(hours_of(space))
+    words = [streams.block(np.uint64(seed), 0, streams.YEAR, 0, 0, n)[0] for n in range(len(whole))]
+    return [whole[n] for n in sorted(range(len(whole)), key=lambda n: (int(words[n]), n))]
 
 
 class Uav:
@@ -104,22 +156,22 @@ class Uav:
 class Campaign:
     """A year of a fleet, window by window."""
 
-    def __init__(self, plan: YearPlan, space: ScenarioSpace, seed: int, replication: int):
-        """Begin the year with nodes that have just been emptied, and full batteries.
+    def __init__(self, space: ScenarioSpace, seed: int, replication: int):
+        """Begin a year with nodes that have just been emptied, and full batteries.
 
         Args:
-            plan: The windows of the year.
-            space: The scenario of the fleet, which has a data sheet and a single number of UAVs.
+            space: The scenario of the fleet, which has weather.
             seed: Seed of the study.
             replication: The number of the year among its replications.
         """
         assert space.units
-        self.plan, self.space, self.replication = plan, space, replication
+        self.space, self.replication = space, replication
+        self.plan = plan_of(space, years_of(space, seed)[replication])
         self.slot = 1000 * space.units.slot  # [ms]
         self.mission = constants_of(space).view(np.recarray)
         self.mission.seed, self.mission.replication = seed, replication
         self.mission.age_measured = 0
-        self.mission.due = space.weather.due_hours * HOUR / self.slot
+        self.mission.due = 1000 * measured(space.weather.due, "s")[0] / self.slot
         self.rates = np.array(space.node_rates)
         self.data = np.array([low for low, _ in space.node_data])
         self.emptied = np.zeros(len(self.rates), np.int64)  # when each node was emptied last [ms]
@@ -218,7 +270,7 @@ class Campaign:
         return [n - int(o.sum()) for n, o in zip(self.space.zone_pads, out, strict=False)]
 
     def _write_start(
-        self, starts: Starts, b: int, window: Window, slots: int, begin: int
+        self, starts: Starts, b: int, window: YearWindow, slots: int, begin: int
     ) -> None:
         mission = starts.constants[b : b + 1].view(np.recarray)
         mission[0] = self.mission[0]
@@ -286,7 +338,7 @@ class Campaign:
         for name in ("seed", "replication", "flying_time", "charge_start", "charge_complete"):
             year[name] = mission[name]
         windows = max(totals.windows, 1)
-        year["uavs"], year["slots"] = len(self.fleet), round(slots)
+        year["uavs"], year["slots"] = len(self.fleet), totals.slots  # hours are paid in windows
         year["success"], year["home"] = totals.success / windows, totals.home / windows
         year["initial"], year["arrived"] = totals.initial.sum(), totals.arrived.sum()
         year["collected"], year["residual"] = totals.lands, self.data.sum()

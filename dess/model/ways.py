@@ -130,7 +130,9 @@ class WaysOfPlaces:
         self._sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
         self._slowest = slowest
         cells, size = len(chart.parking), chart.zones.size
-        speeds = slowest if cells * slowest * size <= MOST_ENTRIES else 0
+        speeds = slowest
+        if cells * slowest * size > MOST_ENTRIES:
+            speeds = 0
         self.reach = np.zeros((places, cells, speeds, *chart.zones.shape), np.int32)
         self.home = np.zeros((places, slowest, *chart.zones.shape), np.int32)
 

@@ -1,7 +1,7 @@
 """Years at sea, many together: each place of a batch flies the windows of a year one by one.
 
     years = Years(campaigns, world)
-    years.run(team, records)      # row b is the year of campaigns[b]
+    years.run(team, records, rows)      # row rows[b] is the year of campaigns[b]
 
 A window is a mission of its own weather, so each place has its own table of ways. When a window
 ends, the next one of the same year takes its place (``dess.model.campaign``). Fleets and years that
@@ -9,6 +9,7 @@ share a sea are advanced in lockstep, as the missions of ``simulate_batch`` are.
 """
 
 from collections.abc import Callable, Sequence
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,17 @@ from dess.model.channel import World, empty_scratch
 from dess.model.record import Records, empty_records, write_records
 from dess.model.state import starts_of, state_of
 from dess.model.view import decide
-from dess.model.ways import WaysOfPlaces
+from dess.model.ways import MOST_ENTRIES, WaysOfPlaces
+from dess.physics.chart import Chart
 from dess.physics.fleet import slowest
 from dess.physics.landing import is_over
+from dess.scenario.scenario import ScenarioSpace
+
+
+def most_places(spaces: Sequence[ScenarioSpace], chart: Chart) -> int:
+    """How many places have room in memory for their tables of ways."""
+    speeds = max(slowest(space.fleet) for space in spaces)
+    return max(MOST_ENTRIES // (len(chart.parking) * speeds * chart.zones.size), 1)
 
 
 class Years:
@@ -45,28 +54,38 @@ class Years:
         self,
         team: Sequence[Any],
         records: Records,
+        rows: Sequence[int],
         progress: Callable[[int], object] | None = None,
+        stopped: Event | None = None,
     ) -> None:
-        """Simulate all years with the policies of a team, and write their records."""
+        """Simulate all years.
+
+        Args:
+            team: The policies of the fleets.
+            records: Where the records are written.
+            rows: The row of each place in them.
+            progress: Called with 1 when a year has ended.
+            stopped: When it is set, no further slot begins.
+        """
         for b in range(len(self.campaigns)):
-            self._begin_window(b, records)
+            self._begin_window(b)
         shown = self.world.shown()
-        while self.has_window.any():
+        while self.has_window.any() and not (stopped and stopped.is_set()):
             decide(team, self.state, shown, self.ways)  # type: ignore[arg-type]
             for b in _advance(self.has_window, self.state, self.world, self.scratch):
                 self._end_window(b)
-                self._begin_window(b, records)
+                self._begin_window(b)
                 if progress and not self.has_window[b]:
                     progress(1)
+        for campaign, row in zip(self.campaigns, rows, strict=True):
+            campaign.end_year(records, row)
 
-    def _begin_window(self, b: int, records: Records) -> None:
-        """Launch the next window of a place, or end its year."""
-        campaign = self.campaigns[b]
-        number = campaign.begin_window(self.starts, b)
+    def _begin_window(self, b: int) -> None:
+        """Launch the next window of a place, if its year has one."""
+        number = self.campaigns[b].begin_window(self.starts, b)
         self.has_window[b] = number >= 0
         if number < 0:
             self.state.missions["active"][b] = 0
-            campaign.end_year(records, b)
             return
         self.ways.fill(b, self.starts.constants[b : b + 1])
         _launch(self.state, b, self.starts, number)

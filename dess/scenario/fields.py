@@ -40,6 +40,7 @@ SECTIONS = (
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
 LANDING = "landing"
+MOST_YEAR = 366 * 86_400  # [s]
 ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
@@ -374,6 +375,13 @@ class Fields(Strict):
         if isinstance(value, Section):
             return value.is_on
         return bool(value)
+
+    @property
+    def longest_slots(self) -> int:
+        """The most mission slots that a mission may last, or with weather a year."""
+        if self.weather.is_on and self.units:
+            return int(MOST_YEAR / self.units.slot)
+        return self.max_slots
 
     @property
     def needs_events(self) -> bool:

@@ -157,6 +157,12 @@ class Constants(Fields):
         most = [m.le for m in limits if hasattr(m, "le")]
         return between.get(field) or (max(least, default=-inf), min(most, default=inf))
 
+    def without_weather(self) -> Self:
+        """The scenario of one mission in still air, if it is one of years, or else itself."""
+        if not self.weather.is_on:
+            return self
+        return self.model_copy(update={"weather": type(self.weather).off()})
+
     def to_toml(self) -> str:
         """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
