@@ -108,8 +108,10 @@ _LEVELS = {
 _OF_SHEET = {
     "data_sheet.data_rate": ("bit/s", (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)),
     "data_sheet.wind": ("m/s from deg", (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)),
+    "data_sheet.mtbf": ("s", (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0)),
 }
-_RATES = ("failures.uav_rate",)  # settings that are told as the mean time between events
+# How often UAVs fail, which is told as the mean time between failures.
+_FAILURES = ("failures.uav_rate", "data_sheet.mtbf")
 _EXAMPLE_SETTINGS = ("uavs", "pads", "arrival_rate")
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 # What a search can require, by the names of the command line.
@@ -582,9 +584,9 @@ def _describe_setting(
         place = " in zone 1"
     name, unit = field.name, field.unit
     texts = [value_text(value) for value in values]
-    if key in _RATES:
+    if key in _FAILURES:
         name, unit = _failure_in_words(space), ""
-        texts = [_time_between(rate, space.units) for rate in values]
+        texts = [_time_between(value, space.units) for value in values]
     if key in _OF_SHEET and not isinstance(values[0], str):
         listed = _amount_of(key, space.plain_value(key))
         texts = [f"{_amount_of(key, of_nodes) / listed:g} times the sheet's" for of_nodes in values]
@@ -600,8 +602,10 @@ def _describe_setting(
     }
 
 
-def _time_between(rate: float, units: Units | None) -> str:
-    """A rate per mission slot as the mean time from one event to the next."""
+def _time_between(rate: float | str, units: Units | None) -> str:
+    """A rate per mission slot, or a time, as the mean time from one event to the next."""
+    if isinstance(rate, str):
+        return f"one every {rate}"
     if rate == 0.0:
         return "none"
     if units is None:
