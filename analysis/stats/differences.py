@@ -110,7 +110,7 @@ def metrics_by_group(
     """
     groups = missions[[*by]].drop_duplicates(ignore_index=True)
     keys = [group_key(row) for row in groups.itertuples(index=False)] if by else [()]
-    in_groups = {}
+    in_groups: dict[tuple, Metric] = {}
     for column in metrics:
         measure = metric_in_groups(missions, column, by, groups)
         in_groups |= {(column, *key): measure.at(place) for place, key in enumerate(keys)}
@@ -336,8 +336,8 @@ def column_tests(
         p = np.nan
         if measured.any():
             pairs = of_column[measured], of_baseline[measured]
-            of_both = measure.at(place), float(level), metric_of_baseline
-            ends, p = difference_test(*pairs, *of_both)
+            own = measure.at(place)
+            ends, p = difference_test(*pairs, own, float(level), metric_of_baseline)
         rows.append((*ends, p, measured.sum()))
     return pd.DataFrame(rows, values.columns, ["difference", "low", "high", "p", "n"])
 
