@@ -466,7 +466,7 @@ def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
     """The least and the largest value that each mission can have of a metric.
 
     A time may be as long as the mission (``MOST_SLOTS``), a wait as long as somebody can wait
-    (``MOST_WAITING``), and where nobody can, there is no queue. A cost has the range of
+    (``MOST_WAITING``), and where no UAV can, there is no queue. A cost has the range of
     ``LEAST_COST`` and ``MOST_COST``. No more data can be collected, or left, than both together.
 
     Args:

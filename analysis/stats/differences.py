@@ -227,7 +227,7 @@ def difference_test(
     """The mean difference A - B of pairs, the interval that suits the metric, and its p-value.
 
     The interval ends where the ranges of both sides end: the wait for a pad is not shorter than
-    where nobody can wait.
+    where no UAV can wait.
 
     Args:
         a: (n,) values of A.
