@@ -427,6 +427,35 @@ class Variation:
         heads = ["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"]
         return pd.DataFrame(lines, columns=heads)
 
+    def finding(self, metric: str = PRODUCT) -> str:
+        """How a metric differs with each policy, in a sentence for the caption of a figure.
+
+        Args:
+            metric: The metric.
+        """
+        table = self.table()
+        measure = metric_of(metric)
+        unit = " points" if measure.in_percent else f" {measure.unit}".rstrip()
+        parts = []
+        for row in table[table["metric"] == metric].itertuples():
+            if not row.n:
+                parts.append(f"with {row.policy} measured on one side alone")
+            elif row.low == row.high == 0:
+                parts.append(f"with {row.policy} the same in all pairs")
+            else:
+                verdict = _VERDICTS[judge_difference(row)]
+                parts.append(f"with {row.policy} {verdict} ({format_change(row)}{unit})")
+        return f"{measure.name} in the variation: {'; '.join(parts)}. "
+
+    def spread_in_words(self) -> str:
+        """In how many missions the product differs with each policy, in a sentence."""
+        parts = []
+        for policy in self.results.policies:
+            gaps = product_differences(self.results, policy)
+            better, worse = (numbers.format_percent(part.mean()) for part in (gaps > 0, gaps < 0))
+            parts.append(f"with {policy} higher in {better} and lower in {worse} of the pairs")
+        return f"Product in the variation: {'; '.join(parts)}. "
+
     def plot(self) -> "Figure":
         """The paired differences of the metrics, with intervals."""
         from dess.analysis.figures import comparison

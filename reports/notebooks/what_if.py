@@ -52,7 +52,8 @@ make_answer(asked.headline())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
+caption = f"{variation.finding()}{pairs}; {tables.BARS}"
+lead_figure(variation.plot(), "Paired differences of the metrics", caption)
 
 # %%
 make_facts(asked.facts())
@@ -69,7 +70,8 @@ extended = [metric for metric in measured_columns(found) if found.missions[metri
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
-spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
+spread = f"{variation.spread_in_words()}{pairs}."
+spread += " The lower panel ends at the 5 % and 95 % quantiles."
 make_gallery(
     [
         (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
@@ -77,7 +79,7 @@ make_gallery(
             (
                 variation.plot_means(metric),
                 f"{metric_of(metric).name}, baseline and variation",
-                f"{metric_of(metric).name}. {caption}",
+                f"{variation.finding(metric)}{caption}",
             )
             for metric in (*metrics.METRICS, *extended)
         ),

@@ -317,3 +317,23 @@ def test_a_headline_has_at_most_25_words(answer, tmp_path):
     for each in (answer, many):
         assert len(each.headline().split()) <= 25
     assert many.headline().startswith("4 changed fields: product with ")
+
+
+def test_captions_say_what_the_figures_show(answer):
+    """Of each policy how it differs, with its numbers; and where nothing differs, so it is."""
+    variation = answer.variation
+    for metric in (PRODUCT, SUCCESS, "slots"):
+        sentence = variation.finding(metric)
+        rows = answer.table().query("metric == @metric")
+        assert sentence.count(" with ") == len(rows) == len(answer.results.policies)
+        for row in rows.itertuples():
+            if row.low < row.high:
+                assert f"with {row.policy} " in sentence
+                assert f"({found.format_change(row)}" in sentence
+    for policy in answer.results.policies:
+        share = numbers.format_percent(
+            (found.product_differences(answer.results, policy) > 0).mean()
+        )
+        assert f"higher in {share} and lower in" in variation.spread_in_words()
+    never = answer.table().query("low == high == 0").iloc[0]
+    assert f"with {never['policy']} the same in all pairs" in variation.finding(never["metric"])
