@@ -405,6 +405,16 @@ def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 
     return replace(metric, most=longest)
 
 
+def metric_of_years(metric: Metric) -> Metric:
+    """The same metric of years with weather, of which each has hundreds of missions.
+
+    An outcome is the share of its windows, and no rare year lies far from all others.
+    """
+    if metric.is_outcome:
+        metric = replace(metric, kind="share")
+    return replace(metric, fails=False, failure=0.0)
+
+
 def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
     """A table of missions without the columns that have a list for every mission."""
     return missions.drop(columns=[*NODES_BEHIND.values()], errors="ignore")
@@ -416,8 +426,8 @@ def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
     if metric_of(column).is_wait:
         slots = longest_wait(space)
     metric = metric_for_length(column, slots, space.units, space.uavs[1])
-    if metric.is_outcome and space.weather.is_on:
-        metric = replace(metric, kind="share")  # of the windows of a year
+    if space.weather.is_on:
+        metric = metric_of_years(metric)
     if column in NODES_BEHIND:
         return replace(metric, among=len(space.nodes))
     return metric
@@ -434,8 +444,8 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     metric = metric_of(column)
     if not len(missions):
         return metric
-    if metric.is_outcome and WINDOWS in missions and not missions[WINDOWS].isna().all():
-        metric = replace(metric, kind="share")  # of the windows of a year
+    if WINDOWS in missions and not missions[WINDOWS].isna().all():
+        metric = metric_of_years(metric)
     nodes = NODES_BEHIND.get(column)
     if nodes in missions:
         metric = replace(metric, among=len(np.asarray(missions[nodes])[0]))

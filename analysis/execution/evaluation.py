@@ -25,6 +25,7 @@ from dess.analysis.execution.workers import Here, Pool
 from dess.analysis.metrics import (
     METRICS,
     NODES_BEHIND,
+    WINDOWS,
     columns_in_units,
     measured_in,
     metric_in_space,
@@ -186,7 +187,7 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
     for records, took in _simulate_pieces(asked, pieces, progress):
         _add_to_moments(moments, _metric_values(records, asked.scenario), records.missions["uavs"])
         if asked.missions <= MOST_COMPARED:
-            values.append(pd.DataFrame(records.missions[_COMPARED]))
+            values.append(_compared_columns(records))
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
     kept = None
@@ -195,6 +196,14 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
     over_space = _over_space(moments, asked.scenario, asked.missions)
     compared = pd.concat(values, ignore_index=True) if values else None
     return Evaluation(asked.team, over_space, uav_slots, seconds, kept, compared)
+
+
+def _compared_columns(records: Records) -> pd.DataFrame:
+    """What policies are compared by, and of years with weather the windows, which tell them."""
+    columns = pd.DataFrame(records.missions[_COMPARED])
+    if WINDOWS in (records.operations.dtype.names or ()):
+        columns[WINDOWS] = records.operations[WINDOWS]
+    return columns
 
 
 def of_results(results: Results) -> list[Evaluation]:
@@ -210,7 +219,8 @@ def of_results(results: Results) -> list[Evaluation]:
         _add_to_moments(moments, metrics | _values_by_node(rows), rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))
         uav_slots = int(rows["uav_slots"].sum())
-        evaluation = Evaluation(str(team), over_space, uav_slots, nan, compared=rows[_COMPARED])
+        columns = [*_COMPARED, *(name for name in [WINDOWS] if name in rows)]
+        evaluation = Evaluation(str(team), over_space, uav_slots, nan, compared=rows[columns])
         evaluations.append(evaluation)
     return evaluations
 

@@ -75,6 +75,39 @@ _CRUISE = "data_sheet.cruise"
 DRAFT = "draft"
 
 
+def changed(values: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The values of a scenario with changes of some of them.
+
+    Args:
+        values: The values.
+        changes: What replaces some of them, as for ``merged``. Where that is the cruise of the data
+            sheet, the cell stays, and the endurance is still that of the cruise before.
+        where: What names the scenario in messages.
+
+    Raises:
+        InputError: If the changes do not fit, or the data sheet is not valid.
+    """
+    return merged(merged(dict(values), dict(changes)), _kept_at_cruise(values, changes, where))
+
+
+def _kept_at_cruise(
+    values: Mapping[str, Any], changes: Mapping[str, Any], where: str
+) -> dict[str, Any]:
+    """What a data sheet keeps where its cruise is replaced."""
+    replaced = dotted(dict(changes))
+    others = {field: value for field, value in replaced.items() if field != _CRUISE}
+    sheet = merged(dict(values), others).get("data_sheet")
+    if _CRUISE not in replaced or not (isinstance(sheet, dict) and sheet.get("cruise")):
+        return {}
+    of_file = validated(DataSheet, sheet, where)
+    kept = {}
+    if not of_file.cell:
+        kept["data_sheet.cell"] = f"{of_file.units.cell!r} m"
+    if "data_sheet.endurance" not in replaced and " at " not in (of_file.endurance or ""):
+        kept["data_sheet.endurance"] = f"{of_file.endurance} at {of_file.cruise}"
+    return kept
+
+
 class Constants(Fields):
     """The common base of both kinds of scenario: their fields agree with each other."""
 
@@ -143,7 +176,7 @@ class Constants(Fields):
         base = {}
         if scenario is not None:
             base = loaded(scenario).model_dump()
-        return validated(cls, merged(base, values), "scenario")
+        return validated(cls, changed(base, values, "scenario"), "scenario")
 
     def limits(self, field: str) -> tuple[float, float]:
         """The least and the largest value that a numeric field may have, infinite without a limit.
@@ -293,8 +326,7 @@ def _of_values(
 ) -> ScenarioSpace:
     """The scenario of the values that its file has, and of those that replace them."""
     read.pop("description", None)
-    read = _with_weather_beside(name_or_path, read)
-    values = merged(merged(read, overrides), _kept_at_another_cruise(read, overrides, where))
+    values = changed(_with_weather_beside(name_or_path, read), overrides, where)
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         beside = partial(_SCENARIOS.beside, name_or_path)
@@ -311,27 +343,6 @@ def _of_values(
     if not is_scenario_name(str(name_or_path)) and distance_error(space) >= TOLD_ERROR:
         tell(f"{where}: {distance_sentence(space)}")
     return space
-
-
-def _kept_at_another_cruise(
-    read: Mapping[str, Any], overrides: Mapping[str, Any], where: str
-) -> dict[str, Any]:
-    """What a data sheet keeps where another cruise replaces that of its file.
-
-    The cell stays, and the endurance is still that of the cruise of the file.
-    """
-    replaced = dotted(dict(overrides))
-    others = {field: value for field, value in replaced.items() if field != _CRUISE}
-    sheet = merged(dict(read), others).get("data_sheet")
-    if _CRUISE not in replaced or not (isinstance(sheet, dict) and sheet.get("cruise")):
-        return {}
-    of_file = validated(DataSheet, sheet, where)
-    kept = {}
-    if not of_file.cell:
-        kept["data_sheet.cell"] = f"{of_file.units.cell!r} m"
-    if "data_sheet.endurance" not in replaced and " at " not in (of_file.endurance or ""):
-        kept["data_sheet.endurance"] = f"{of_file.endurance} at {of_file.cruise}"
-    return kept
 
 
 def _with_weather_beside(name_or_path: str | Path, read: dict[str, Any]) -> dict[str, Any]:

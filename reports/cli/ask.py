@@ -32,6 +32,7 @@ app = typer.Typer()
 
 @options.add_command(app)
 def sweep(
+    context: typer.Context,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.complete_fields),
@@ -41,6 +42,7 @@ def sweep(
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
+    years: options.YearsOption = None,
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
@@ -88,12 +90,13 @@ def sweep(
         values,
         scenario,
         policies,
-        missions,
+        options.given(context, "missions"),
         seed,
         options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
         options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         folder=results,
+        years=years,
     )
     parameters = {}
     if metric:
@@ -113,6 +116,7 @@ def sweep(
 
 @options.add_command(app, WHAT_IF)
 def what_if(
+    context: typer.Context,
     settings: Annotated[
         list[str],
         typer.Option(options.SET, metavar="KEY=VALUE", autocompletion=options.complete_fields),
@@ -124,6 +128,7 @@ def what_if(
         list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
     missions: Annotated[int, typer.Option(min=2)] = 500,
+    years: options.YearsOption = None,
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
@@ -154,7 +159,9 @@ def what_if(
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
-    question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
+    question = what_if_question(
+        changes, fixed, scenario, policy, options.given(context, "missions"), seed, results, years
+    )
     check_shown(question, shown)
     asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
     answer = VariationAnswer(asked_results, question, shown)
@@ -163,7 +170,8 @@ def what_if(
         "baseline": fixed,
         "scenario": scenario,
         "policies": [*map(str, question.study.policies)],
-        "missions": missions,
+        "missions": None if question.study.years else missions,
+        "years": question.study.years,
         "seed": seed,
         "shown": shown,
     }

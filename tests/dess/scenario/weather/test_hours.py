@@ -30,7 +30,9 @@ def write(tmp_path):
 
     def write(values: list[tuple[Any, ...]], begin: str = "2020-01-01T00") -> Path:
         hours = np.datetime64(begin, "h") + np.arange(len(values))
-        lines = [",".join(map(str, row)) for row in zip(hours, *zip(*values, strict=True), strict=True)]
+        lines = [
+            ",".join(map(str, row)) for row in zip(hours, *zip(*values, strict=True), strict=True)
+        ]
         lines = [line.replace(",", ":00,", 1) for line in lines]
         path = tmp_path / "weather.csv"
         path.write_text("\n".join(["time,wind,from,waves", *lines]))
