@@ -212,7 +212,7 @@ def _costs_of(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarr
         shares = flight.wing.power(airspeeds_of(speed, wind, origin)) / flight.wing.power(speed)
         of_slots = np.maximum(np.ceil(flight.of_cruising * shares - 1e-6), 1)
         if slots in flight.slots_per_cell and len(wind) and of_slots.max() > MOST_COST:
-            problem = f"a slot takes {of_slots.max() / PERCENT:.1f} % in an hour in which UAVs can fly"
+            problem = f"an open hour takes {of_slots.max() / PERCENT:.1f} % a slot"
             raise InputError("data_sheet.max_speed", problem, f"{MOST_COST // PERCENT} % at most")
         costs[:, slots - 1] = np.minimum(of_slots, np.iinfo(np.int16).max)
     return costs
