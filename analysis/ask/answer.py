@@ -397,6 +397,7 @@ def what_if(
     folder: str | Path = "results",
     workers: int = 1,
     *,
+    prices: Mapping[str, Any] | None = None,
     shown: str | None = None,
     progress: Progress | None = None,
     yes: bool = False,
@@ -417,15 +418,18 @@ def what_if(
         seed: Seed of the missions.
         folder: Folder in which results are stored.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
+        prices: Prices, as for ``sweep``: then costs are compared as well.
         shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
         progress: Called with the number of missions done since its last call.
         yes: Whether the question may take more than an hour.
 
     Raises:
-        InputError: Before anything is written, if a field, a value or a policy is unknown or not
-            allowed, a policy cannot act in the scenario, or the question would take long.
+        InputError: Before anything is written, if a field, a value, a policy or a price is unknown
+            or not allowed, a policy cannot act in the scenario, or the question would take long.
     """
-    question = what_if_question(settings, baseline, scenario, policies, missions, seed, folder)
+    question = what_if_question(
+        settings, baseline, scenario, policies, missions, seed, folder, prices=prices
+    )
     check_shown(question, shown)
     return VariationAnswer(_ask(question, workers, progress, yes), question, shown)
 
