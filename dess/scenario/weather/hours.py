@@ -201,7 +201,7 @@ def _can_fly(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarra
     """
     speed = flight.cruise / min(flight.slots_per_cell)
     airspeeds = airspeeds_of(speed, wind, origin)
-    return (airspeeds <= flight.max_speed * (1 + _ROUNDING)).all(1)
+    return np.asarray((airspeeds <= flight.max_speed * (1 + _ROUNDING)).all(1))
 
 
 def _costs_of(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarray:
