@@ -26,7 +26,7 @@ from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of
 from dess.analysis.ask import around
 from dess.analysis.ask.around import one_more_facts
 from dess.analysis.ask.assumptions import assumption_facts
-from dess.analysis.ask.falls import fall_facts
+from dess.analysis.ask.falls import fall_facts, setting_fall_facts
 from dess.analysis.ask.limits import limit_facts
 from dess.analysis.ask.question import Question, sweep_question, values_of, what_if_question
 from dess.analysis.execution.jobs import Progress
@@ -125,8 +125,9 @@ class SweepAnswer(Answer):
         return best_setting_headline(self.results, self._ranked(), self._ranking_metric)
 
     def own_facts(self) -> list[Fact]:
-        """The best setting, how the others compare, those of other policies, and the prices."""
+        """The best setting, how the others compare, where more collect less, and the prices."""
         facts = best_setting_facts(self.results, self._ranked(), self._ranking_metric)
+        facts += setting_fall_facts(self.results)
         if self.results.study.costs:
             facts += price_facts(self.results)
         return facts
@@ -302,8 +303,8 @@ class VariationAnswer(Answer):
         return self.variation.headline()
 
     def own_facts(self) -> list[Fact]:
-        """What the variation changes for every policy."""
-        return self.variation.facts()
+        """What the variation changes for every policy, and whether more collect less."""
+        return [*self.variation.facts(), *setting_fall_facts(self.results)]
 
     def table(self) -> pd.DataFrame:
         """The differences, a row per policy and metric, as ``answers.variation.compare_sides``."""
