@@ -83,7 +83,7 @@ class Hours:
 
     @property
     def names(self) -> dict[int, str]:
-        """What closes an hour in a word, by its state; ``limits.waves`` is a limit."""
+        """What closes an hour in a word, by its state, such as limits.waves for a limit."""
         of_limits = {State.LIMIT + n: f"limits.{name}" for n, name in enumerate(self.limits)}
         states = (State.NIGHT, State.MISSING, State.WIND)
         return {int(state): state.name.lower() for state in states} | of_limits
