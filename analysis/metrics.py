@@ -102,6 +102,15 @@ class Metric:
             np.isfinite(self.range[0]).all() and np.isfinite(self.range[1]).all()
         )
 
+    def at(self, place: Any) -> "Metric":
+        """The metric of some of the samples that are estimated together, with their ranges.
+
+        Args:
+            place: What indexes an array with an entry for each sample, such as a position.
+        """
+        least, most = (end if np.ndim(end) == 0 else end[place] for end in (self.least, self.most))
+        return replace(self, least=least, most=most)
+
     @property
     def is_wait(self) -> bool:
         """Whether it is 0 in missions in which no UAV can wait for a pad."""
@@ -209,6 +218,7 @@ PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
+QUEUE = "queue"
 # Of a study with bounds: the bound, and the bound minus the product.
 BOUND, GAP = "upper_bound", "optimality_gap"
 
@@ -299,7 +309,7 @@ _GROUPS["operations"] = (
     _amount_metric("delivered", "Packets delivered"),
     _amount_metric("lost_packets", "Packets lost", less=True),
     _amount_metric("lost", "Data lost", _DATA, "MB", less=True),
-    _amount_metric("queue", "UAVs waiting for a pad", less=True),
+    _amount_metric(QUEUE, "UAVs waiting for a pad", less=True),
     _time_metric("waiting", "Waiting time for a pad", "min"),
     _amount_metric("pad_requests", "Requests for a pad", neutral=True),
     Metric("utilisation", "Utilisation of the pads", kind="share", is_neutral=True),
@@ -440,9 +450,9 @@ def metric_in_groups(
     """
     metric = metric_in_missions(missions, column)
     least, most = ranges_of_missions(missions, column)
-    if np.ndim(most) == 0 or np.ptp(least) == np.ptp(most) == 0:
+    if all((np.asarray(end) == np.ravel(end)[0]).all() for end in (least, most)):
         return metric
-    ends = missions[[*by]].assign(least=least, most=most).groupby([*by])
+    ends = missions[[*by]].assign(least=least, most=most).groupby([*by], dropna=False)
     place = pd.MultiIndex.from_frame(groups[[*by]])
     lowest, highest = ends["least"].min(), ends["most"].max()
     if len(by) == 1:
@@ -456,8 +466,8 @@ def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
     """The least and the largest value that each mission can have of a metric.
 
     A time may be as long as the mission (``MOST_SLOTS``), a wait as long as somebody can wait
-    (``MOST_WAITING``), a cost has the range of ``LEAST_COST`` and ``MOST_COST``, and no more data
-    can be collected, or left, than both together.
+    (``MOST_WAITING``), and where no UAV can, there is no queue. A cost has the range of
+    ``LEAST_COST`` and ``MOST_COST``. No more data can be collected, or left, than both together.
 
     Args:
         missions: The missions. Of a column that they lack, nothing is known.
@@ -476,6 +486,8 @@ def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
             if column in (_PER_UAV, _IN_SHEET_UNIT[_PER_UAV]):
                 most = most / np.asarray(missions["uavs"])
             return metric.range[0], most
+    if column == QUEUE and MOST_WAITING in missions:
+        return metric.range[0], np.where(np.asarray(missions[MOST_WAITING]) > 0, inf, 0.0)
     if not metric.horizons:
         return metric.range
     longest = metric_of(MOST_SLOTS)

@@ -5,10 +5,11 @@ A section that ``SECTIONS`` of this module does not list fails, and so does a ro
 """
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, get_args
 
 import pytest
@@ -38,18 +39,23 @@ class Row(NamedTuple):
         guard, planner, bound: What the source of the part reads of the section if it handles it: a
             field of a record that the section changes, or a function of the section's module.
             Otherwise one of ``WORDS``.
+        others: What a scenario with the section needs besides.
     """
 
     settings: Any
     guard: str
     planner: str
     bound: str
+    others: Mapping[str, Any] = MappingProxyType({})
 
 
 SHEET = {
     **{"endurance": "50 min", "cruise": "15 m/s", "charging": "5 min"},
     **{"bandwidth": "1 MHz", "snr": "12 dB at 2 km", "data_rate": "3 MB/h"},
 }
+
+FAST = {"max_speed": "23 m/s"}
+WEATHER = {"file": "era5-40.0N-72.5W-1990-2020.parquet"}
 
 SECTIONS = {
     "arrivals": Row({"rates": [0.5] * 25}, "arrival_rate", "arrival_rate", REFUSED),
@@ -61,6 +67,7 @@ SECTIONS = {
     "consumption": Row({"slots": [[900] * 5]}, "dearest_slot", "has_costs", REFUSED),
     "fleet": Row([{"slots_per_cell": 2}], "slots_per_cell", "slots_per_cell", REFUSED),
     "data_sheet": Row(SHEET, WITHOUT_EFFECT, WITHOUT_EFFECT, REFUSED),
+    "weather": Row(WEATHER, REFUSED, REFUSED, REFUSED, {"data_sheet": SHEET | FAST}),
     "landing": Row(True, "lands", "lands", REFUSED),
 }
 
@@ -139,7 +146,7 @@ def test_a_section_is_treated_as_its_row_says(section, part):
     row = SECTIONS[section]
     treatment = getattr(row, part)
     if treatment == REFUSED:
-        scenario = ScenarioSpace.of(**{section: row.settings})
+        scenario = ScenarioSpace.of(**{section: row.settings}, **row.others)
         with pytest.raises(InputError):
             REFUSALS[part](scenario)
     elif treatment == WITHOUT_EFFECT:

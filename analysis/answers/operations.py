@@ -23,7 +23,7 @@ from dess.analysis.metrics import (
     RATIO,
     SUCCESS,
     check_metric,
-    metric_in_missions,
+    metric_in_groups,
     metric_of,
 )
 from dess.analysis.names import value_text
@@ -124,20 +124,20 @@ def changes_from_reference(
     if field not in table or reference not in table[field].to_numpy():
         raise InputError(field, f"is never {reference!r} in the study", "one of its values")
     rows = []
-    measure = metric_in_missions(results.missions, metric)
     for policy, missions in results.missions.groupby("policy", sort=False):
         wide = by_replication(missions, metric, "point")
+        measure = metric_in_groups(missions, metric, ["point"], wide.columns.to_frame())
         for point, partner in _pairs_of_points(table, field, reference):
             both = wide[[point, partner]].dropna()
             if both.empty:
                 continue
+            pairs = both[point].to_numpy(float), both[partner].to_numpy(float)
+            own, there = (measure.at(wide.columns.get_loc(name)) for name in (point, partner))
             if relative:
-                pairs = both[point].to_numpy(), both[partner].to_numpy()
                 plain = relative_change(*pairs)
-                change = (*relative_change(*pairs, measure), (plain.high - plain.low) / 2)
+                change = (*relative_change(*pairs, own, there), (plain.high - plain.low) / 2)
             else:
-                values = both.to_numpy(float)
-                pair = compare_pairs(values[:, 0], values[:, 1], metric=measure)
+                pair = compare_pairs(*pairs, metric=own, metric_of_b=there)
                 change = (*pair[:3], pair.student)
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])

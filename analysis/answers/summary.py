@@ -18,7 +18,7 @@ from dess.analysis.metrics import (
     RATIO,
     SUCCESS,
     metric_group,
-    metric_in_missions,
+    metric_in_groups,
     metric_of,
     ranking_column,
 )
@@ -114,10 +114,10 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
     """
     verdicts = pd.Series(ONLY, means.index, dtype=object)
     for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
-        measure = metric_in_missions(results.missions, str(metric))
+        missions = results.missions[results.missions["point"] == point]
+        measure = metric_in_groups(missions, str(metric), ["policy"], rows[["policy"]])
         if measure.is_neutral:
             continue
-        missions = results.missions[results.missions["point"] == point]
         wide = by_replication(missions, str(metric), "policy")
         values = wide[rows["policy"]].to_numpy(float)
         looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])

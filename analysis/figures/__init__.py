@@ -1,7 +1,7 @@
 """Figures: what several answers draw with, and what a page shows of a figure."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pandas as pd
 
@@ -28,11 +28,34 @@ class Drawing(NamedTuple):
     data: pd.DataFrame | None = None
 
 
+def best_place(rows: pd.DataFrame, metric: str) -> Any:
+    """The label of the row with the best mean.
+
+    Args:
+        rows: Means in ``mean``. Where a column ``tied`` says which may be the best by what was
+            seen, it is one of these, and where ``selected`` says which a study has selected, it is
+            one of those.
+        metric: The metric.
+
+    Returns:
+        The label; None if there is no mean.
+    """
+    candidates = rows.dropna(subset="mean")
+    for column in ("tied", "selected"):
+        if column in rows and candidates[column].any():
+            candidates = candidates[candidates[column].astype(bool)]
+    if candidates.empty:
+        return None
+    if metric_of(metric).less_is_better:
+        return candidates["mean"].idxmin()
+    return candidates["mean"].idxmax()
+
+
 def name_best_mean(rows: pd.DataFrame, metric: str, fields: Iterable[str]) -> str:
     """What a figure of means finds: the best mean and where it is, in a sentence.
 
     Args:
-        rows: The means of the figure, in ``mean``, with a column for each field.
+        rows: The means of the figure, as ``best_place`` takes them, with a column for each field.
         metric: The metric.
         fields: The fields, or ``policy``, that say which mean it is.
 
@@ -44,9 +67,15 @@ def name_best_mean(rows: pd.DataFrame, metric: str, fields: Iterable[str]) -> st
         return ""
     measure = metric_of(metric)
     extreme = "highest"
-    place = means.idxmax()
+    farthest = means.max()
     if measure.less_is_better:
         extreme = "lowest"
-        place = means.idxmin()
+        farthest = means.min()
+    place = best_place(rows, metric)
+    among = ""
+    if means[place] != farthest:
+        among = " of what is not ruled out"
+        if "selected" in rows and rows.loc[place, "selected"]:
+            among = " of what the study selects"
     words = [field_named(field).words(rows.loc[place, field]) for field in fields]
-    return f"The {extreme} mean is {measure.write(means[place])}, of {', '.join(words)}. "
+    return f"The {extreme} mean{among} is {measure.write(means[place])}, of {', '.join(words)}. "

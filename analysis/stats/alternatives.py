@@ -57,7 +57,7 @@ def judge_alternatives(
         values: (R, K) values of K alternatives, as ``may_be_best`` takes them.
         low: (K,) lower ends of the intervals of their means.
         high: (K,) upper ends.
-        metric: The metric.
+        metric: The metric; the ends of its range may be (K,) arrays.
         looks: (K,) how often a search could have ended the missions of each.
         left: (K,) those that a selection has not ruled out; the others are ``WORSE``. By default
             all.
@@ -70,7 +70,7 @@ def judge_alternatives(
         return np.array([ONLY], object)
     if left is not None and not left.all():
         verdicts = np.full(values.shape[1], WORSE, object)
-        those = values[:, left], low[left], high[left], metric, looks[left]
+        those = values[:, left], low[left], high[left], metric.at(left), looks[left]
         verdicts[left] = judge_alternatives(*those)
         verdicts[verdicts == ONLY] = BEST
         return verdicts
@@ -111,7 +111,7 @@ def may_be_best(
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a
             replication. Two settings are compared on the replications of both.
         metric: The metric, by default one of which more is better. Its rare differences are
-            added, as in ``dess.analysis.compare``.
+            added, as in ``dess.analysis.compare``. The ends of its range may be (K,) arrays.
         looks: (K,) how often a search could have ended the missions of each setting; by default
             their number is fixed.
         allowance: Whether the rare differences are added. Without them, the settings are those that
@@ -136,7 +136,7 @@ def may_be_best(
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare: list[Any] = [None] * len(blocks)
     if allowance:
-        rare = [_rare_leads(measure, means, means[block, None]) for block in blocks]
+        rare = [_rare_leads(measure, means, block) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
     shared = [np.minimum(looks[block, None], looks) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - error_of_policy) for of_pairs in shared]
@@ -150,10 +150,11 @@ def may_be_best(
 
 
 def _rare_leads(
-    metric: Metric, others: np.ndarray, own: np.ndarray
+    metric: Metric, means: np.ndarray, block: slice
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """The rare differences by which others are ahead of a setting, and behind it."""
-    rare = rare_differences(metric, others, own)
+    """The rare differences by which all others are ahead of the settings of a block, and behind."""
+    rows = (block, None)
+    rare = rare_differences(metric, means, means[rows], metric.at(rows))
     if rare is None or not metric.less_is_better:
         return rare
     return -rare[1], -rare[0]

@@ -1,6 +1,6 @@
 """Differences of treatments on the same missions: matched, tested, corrected for many tests."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from math import hypot
 from typing import Any, Literal, NamedTuple, get_args
@@ -11,7 +11,7 @@ import scipy
 from scipy.special import stdtr
 
 from dess import InputError
-from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_missions, metric_of
+from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_groups, metric_of
 from dess.analysis.stats.intervals import Interval, mean_interval
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.rows import check_columns, check_share, group_rows
@@ -92,6 +92,34 @@ def match_groups(
     means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
     for group, part in group_rows(means[0].reset_index(), by):
         yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
+
+
+def metrics_by_group(
+    missions: pd.DataFrame, metrics: Iterable[str], by: Sequence[str]
+) -> dict[tuple, Metric]:
+    """Each metric with the range that it has in each group of missions.
+
+    Args:
+        missions: The missions, as ``metrics.metric_in_missions`` takes them.
+        metrics: The metrics.
+        by: The columns whose values form the groups; without any, all missions are one.
+
+    Returns:
+        The metrics by their column and the values of the group. Where a value is nan, as of a field
+        that a group does not have, the key has None.
+    """
+    groups = missions[[*by]].drop_duplicates(ignore_index=True)
+    keys = [group_key(row) for row in groups.itertuples(index=False)] if by else [()]
+    in_groups: dict[tuple, Metric] = {}
+    for column in metrics:
+        measure = metric_in_groups(missions, column, by, groups)
+        in_groups |= {(column, *key): measure.at(place) for place, key in enumerate(keys)}
+    return in_groups
+
+
+def group_key(group: Iterable[Any]) -> tuple:
+    """The values of a group in a form in which equal ones are found again, nan too."""
+    return tuple(None if pd.isna(value) else value for value in group)
 
 
 def _first_row(keys: pd.DataFrame) -> str:
@@ -190,32 +218,58 @@ def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
 
 
 def difference_test(
-    a: np.ndarray, b: np.ndarray, metric: str | Metric, level: float
+    a: np.ndarray,
+    b: np.ndarray,
+    metric: str | Metric,
+    level: float,
+    metric_of_b: Metric | None = None,
 ) -> tuple[Interval, float]:
     """The mean difference A - B of pairs, the interval that suits the metric, and its p-value.
+
+    The interval ends where the ranges of both sides end: the wait for a pad is not shorter than
+    where no UAV can wait.
 
     Args:
         a: (n,) values of A.
         b: (n,) values of B.
         metric: The metric; Student's t, if nothing is known of its rare differences.
         level: Confidence level.
+        metric_of_b: The metric with the range that it has on side B; by default the same.
     """
     differences = differences_of(a, b)
     measure = metric_of(metric)
     level = measure.level_of_each(level)
-    rare = rare_differences(measure, a.mean(), b.mean())
+    rare = rare_differences(measure, a.mean(), b.mean(), metric_of_b)
     if rare is None or (differences.size == 1 and not measure.is_bounded):
-        return t_test(differences, level)
-    smooth, p = t_test(add_rare_pairs(differences, rare), level)
+        interval, p = t_test(differences, level)
+    else:
+        interval, p = t_test(add_rare_pairs(differences, rare), level)
     if measure.is_outcome and np.isin(differences, (-1, 0, 1)).all():
         p = mcnemar_p_value(int(np.sum(differences > 0)), int(np.sum(differences < 0)))
-    limit = measure.range[1] - measure.range[0]
-    mean = float(differences.mean())
     p = min(p * measure.among, 1.0)
-    return Interval(mean, max(smooth.low, -limit), min(smooth.high, limit)), p
+    mean = float(differences.mean())
+    lowest, highest = range_of_difference(measure, metric_of_b)
+    # A mean at an end of the range may lie beyond it by rounding; nan stays nan.
+    low = np.minimum(np.maximum(interval.low, lowest), mean)
+    high = np.maximum(np.minimum(interval.high, highest), mean)
+    return Interval(mean, float(low), float(high)), p
 
 
-def rare_differences(metric: Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
+def range_of_difference(metric: Metric, metric_of_b: Metric | None = None) -> tuple[Any, Any]:
+    """The lowest and the highest difference A - B that two values of a metric can have.
+
+    Args:
+        metric: The metric, with its range on side A.
+        metric_of_b: The metric with its range on side B; by default the same.
+    """
+    least, most = metric.range
+    least_of_b, most_of_b = (metric_of_b or metric).range
+    return least - most_of_b, most - least_of_b
+
+
+def rare_differences(
+    metric: Metric, a: Any, b: Any, metric_of_b: Metric | None = None
+) -> tuple[Any, Any] | None:
     """The differences A - B of missions in which only one of two policies does well.
 
     For outcomes, they are 1 and -1. Of a metric with a known range, one value goes to an end of
@@ -227,15 +281,18 @@ def rare_differences(metric: Metric, a: Any, b: Any) -> tuple[Any, Any] | None:
         metric: The metric; that of missions (``metric_in_missions``) has the range of a time.
         a: (...) means of A.
         b: (...) means of B.
+        metric_of_b: The metric with the range that it has on side B; by default the same.
 
     Returns:
         The (...) highest and the (...) lowest differences; None if they are not known.
     """
     if metric.is_outcome:
         return 0 * (a - b) + 1, 0 * (a - b) - 1
-    if metric.has_range:
+    other = metric_of_b or metric
+    if metric.has_range and other.has_range:
         least, most = metric.range
-        return np.maximum(a - least, most - b), -np.maximum(b - least, most - a)
+        least_of_b, most_of_b = other.range
+        return np.maximum(a - least_of_b, most - b), -np.maximum(b - least, most_of_b - a)
     if metric.failure:
         return a - b + metric.failure, a - b - metric.failure
     return None
@@ -254,28 +311,33 @@ def column_tests(
     baseline: pd.Series,
     metric: str | Metric = "",
     levels: float | np.ndarray = LEVEL,
+    metric_of_baseline: Metric | None = None,
 ) -> pd.DataFrame:
     """Paired comparisons of many columns with a baseline, as ``compare_pairs`` makes them.
 
     Args:
         values: (R, K) a row per replication; nan where a column lacks one.
         baseline: (R,) the values of the baseline.
-        metric: The metric; by default one without bounds.
+        metric: The metric; by default one without bounds. The ends of its range may be (K,) arrays.
         levels: The confidence level, or (K,) levels.
+        metric_of_baseline: The metric with the range that it has there; by default the same.
 
     Returns:
         (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
     """
     of_baseline = baseline.to_numpy(float)
+    measure = metric_of(metric)
     rows = []
-    for column, level in zip(values, np.broadcast_to(levels, values.shape[1]), strict=True):
+    levels = np.broadcast_to(levels, values.shape[1])
+    for place, (column, level) in enumerate(zip(values, levels, strict=True)):
         of_column = values[column].to_numpy(float)
         measured = ~np.isnan(of_column) & ~np.isnan(of_baseline)
         ends = Interval(np.nan, np.nan, np.nan)
         p = np.nan
         if measured.any():
             pairs = of_column[measured], of_baseline[measured]
-            ends, p = difference_test(*pairs, metric, float(level))
+            own = measure.at(place)
+            ends, p = difference_test(*pairs, own, float(level), metric_of_baseline)
         rows.append((*ends, p, measured.sum()))
     return pd.DataFrame(rows, values.columns, ["difference", "low", "high", "p", "n"])
 
@@ -315,7 +377,11 @@ class Paired(NamedTuple):
 
 
 def compare_pairs(
-    a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str | Metric = ""
+    a: np.ndarray,
+    b: np.ndarray,
+    level: float = LEVEL,
+    metric: str | Metric = "",
+    metric_of_b: Metric | None = None,
 ) -> Paired:
     """Compare two samples pair by pair; differences are A - B.
 
@@ -325,10 +391,12 @@ def compare_pairs(
         level: Confidence level.
         metric: The metric of the values; by default one without bounds. Post-stratified values of
             shares may lie outside [0, 1].
+        metric_of_b: The metric with the range that it has on side B; by default the same.
 
     Returns:
         The interval and the p-value of ``differences.difference_test``: of Student's t, with
-        rare differences added for all metrics of known range, and for the reward.
+        rare differences added for all metrics of known range, and for the reward, and ends where
+        the ranges of both sides do.
 
         - If all differences of another metric are equal (up to rounding), the interval is
           degenerate (low = difference = high). p is that of the sign test, 2^(1 - n); it is 1 if
@@ -336,7 +404,7 @@ def compare_pairs(
         - A single pair of a metric without bounds has no interval: its ends are nan, and p is 1.
         - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
     """
-    mean, p = difference_test(a, b, metric, level)
+    mean, p = difference_test(a, b, metric, level, metric_of_b)
     differences = differences_of(a, b)
     of_a, of_b, of_differences = map(_sample_variance, (a, b, differences))
     correlation = 0.0
@@ -369,7 +437,8 @@ def compare_unpaired(a: Sequence[float], b: Sequence[float], metric: str) -> Pai
         p = float(test.pvalue)
     n = min(len(a), len(b))
     difference = float(np.mean(a) - np.mean(b))
-    return Paired(difference, float(ends.low), float(ends.high), p, np.nan, np.nan, n)
+    low, high = np.clip((ends.low, ends.high), *range_of_difference(metric_of(metric)))
+    return Paired(difference, float(low), float(high), p, np.nan, np.nan, n)
 
 
 def difference_of_intervals(mean: Interval, other: Interval) -> Interval:
@@ -384,7 +453,10 @@ def difference_of_intervals(mean: Interval, other: Interval) -> Interval:
 
 
 def relative_change(
-    values: np.ndarray, reference: np.ndarray, metric: str | Metric = ""
+    values: np.ndarray,
+    reference: np.ndarray,
+    metric: str | Metric = "",
+    metric_of_reference: Metric | None = None,
 ) -> Interval:
     """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
 
@@ -396,6 +468,7 @@ def relative_change(
         values: (n,) values.
         reference: (n,) reference values of the same replications, whose mean is not 0.
         metric: The metric; by default one without bounds.
+        metric_of_reference: The metric with the range that it has there; by default the same.
     """
     mean = values.mean()
     base = reference.mean()
@@ -405,10 +478,12 @@ def relative_change(
     if n == 1:
         return Interval(ratio - 1, np.nan, np.nan)
     residuals = values - ratio * reference
+    other = metric_of_reference or measure
     least, most = measure.range
-    if measure.has_range:
-        more = max(most - mean, mean - ratio * least)
-        less = min(least - mean, mean - ratio * most)
+    if measure.has_range and other.has_range:
+        least_there, most_there = other.range
+        more = max(most - mean, mean - ratio * least_there)
+        less = min(least - mean, mean - ratio * most_there)
         residuals = add_rare_pairs(residuals, (more, less))
     _, low, high = (ratio - 1 + end for end in mean_interval(residuals / abs(base)))
     return Interval(ratio - 1, max(low, -1.0) if least >= 0 else low, high)
@@ -458,7 +533,7 @@ def compare(
     if not others:
         raise InputError(of, f"nothing to compare with {baseline}", "two or more")
     rows = []
-    measures = {metric: metric_in_missions(missions, metric) for metric in metrics}
+    measures = metrics_by_group(missions, metrics, [of, *by])
     for name in others:
         check_same_missions(tables, name, baseline)
         for group, (a, b) in match_groups([tables[name], reference], by):
@@ -466,7 +541,10 @@ def compare(
                 measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
                 if measured.any():
                     pairs = a[metric][measured], b[metric][measured]
-                    result = compare_pairs(*pairs, level, measures[metric])
+                    ranges = [
+                        measures[metric, side, *group_key(group)] for side in (name, baseline)
+                    ]
+                    result = compare_pairs(*pairs, level, *ranges)
                     rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return add_adjusted(pd.DataFrame(rows, columns=columns), correction)

@@ -13,7 +13,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import Metric, metric_group, metric_in_missions
+from dess.analysis.metrics import Metric, metric_group
 from dess.analysis.stats.differences import (
     Correction,
     add_adjusted,
@@ -21,8 +21,11 @@ from dess.analysis.stats.differences import (
     check_same_missions,
     difference_test,
     differences_of,
+    group_key,
     match_groups,
+    metrics_by_group,
     metrics_by_treatment,
+    range_of_difference,
     rare_differences,
     select_table,
     sign_test,
@@ -154,7 +157,7 @@ def compare_learners(
     tables = metrics_by_treatment(missions, "policy", metrics, by)
     reference = select_table(tables, "policy", baseline)
     rows = []
-    measures = {metric: metric_in_missions(missions, metric) for metric in metrics}
+    measures = metrics_by_group(missions, metrics, by)
     for learner, checkpoints in learners.items():
         if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
             raise InputError(
@@ -169,7 +172,7 @@ def compare_learners(
             for metric in metrics:
                 of_learner = np.stack([a[metric] for a in parts])
                 result, differences = _compare_learner(
-                    of_learner, b[metric], measures[metric], level
+                    of_learner, b[metric], measures[metric, *group_key(group)], level
                 )
                 if len(parts) > 1:
                     about = LEARNER
@@ -196,8 +199,8 @@ def _compare_learner(
     if rare is None or (b.size == 1 and not metric.is_bounded):
         return result, differences
     smooth = compare_crossed(add_rare_pairs(differences, rare), level)
-    limit = metric.range[1] - metric.range[0]
-    ends = {name: float(np.clip(getattr(smooth, name), -limit, limit)) for name in _ENDS}
+    limits = range_of_difference(metric)
+    ends = {name: float(np.clip(getattr(smooth, name), *limits)) for name in _ENDS}
     return result._replace(**ends, p=smooth.p), differences
 
 

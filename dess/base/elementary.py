@@ -5,10 +5,10 @@ offers, and the versions differ in their last bits. The functions here consist o
 multiplications, divisions, square roots and moves of bits, each of which IEEE 754 rounds in exactly
 one way. Numba does not fuse a multiplication with an addition unless it is asked to
 (``fastmath``). So the records of missions depend on code, scenario and seed alone. The errors are
-below one unit in the last place.
+below one unit in the last place, those of ``atan2`` below two.
 
 ``exp``, ``log`` and ``log1p`` are compiled, for missions. The others make tables and settings, and
-are not, since compiling them would take longer than they do; ``log10`` and ``hypot`` take arrays.
+are not, since compiling them would take longer than they do; all of these take arrays as well.
 
 The argument is reduced to a small one, for which a polynomial does (P. T. P. Tang, ACM TOMS 15(2)
 and 16(4); K. C. Ng). The polynomials, and the steps that keep the errors small, are those of
@@ -84,6 +84,30 @@ _C3 = 2.48015872894767294178e-05
 _C4 = -2.75573143513906633035e-07
 _C5 = 2.08757232129817482790e-09
 _C6 = -1.13596475577881948265e-11
+
+# (x - atan(x)) / x in x**2: coefficients on [0, 7/16]; the bounds of intervals, and in two parts
+# the arc tangents of 0, 1/2, 1, 3/2 and infinity, to which the polynomial is added.
+_A0 = 3.33333333333329318027e-01
+_A1 = -1.99999999998764832476e-01
+_A2 = 1.42857142725034663711e-01
+_A3 = -1.11111104054623557880e-01
+_A4 = 9.09088713343650656196e-02
+_A5 = -7.69187620504482999495e-02
+_A6 = 6.66107313738753120669e-02
+_A7 = -5.83357013379057348645e-02
+_A8 = 4.97687799461593236017e-02
+_A9 = -3.65315727442169155270e-02
+_A10 = 1.62858201153657823623e-02
+_ATAN_BOUNDS = np.array([7 / 16, 11 / 16, 19 / 16, 39 / 16])
+_ATAN_HIGH = np.array(
+    [0.0, 4.63647609000806093515e-01, 7.85398163397448278999e-01]
+    + [9.82793723247329054082e-01, 1.57079632679489655800e00]
+)
+_ATAN_LOW = np.array(
+    [0.0, 2.26987774529616870924e-17, 3.06161699786838301793e-17]
+    + [1.39033110312309984516e-17, 6.12323399573676603587e-17]
+)
+_PI_LOW = 1.2246467991473531772e-16
 
 
 @kernel
@@ -224,25 +248,49 @@ def _plain(values: np.ndarray) -> Any:
     return values if values.ndim else values.item()
 
 
-def sin(x: float) -> float:
-    """The sine of an angle of at most 2**20 radians; nan beyond."""
+def sqrt(x: Any) -> Any:
+    """The square root of a number or of each in an array."""
+    if isinstance(x, np.ndarray):
+        return np.sqrt(x)
+    return math.sqrt(x)
+
+
+def sin(x: Any) -> Any:
+    """The sine of an angle of at most 2**20 radians, or of each in an array; nan beyond."""
+    if isinstance(x, np.ndarray):
+        return _sin_of_each(x, 0)
     quadrant, high, low = _reduce_angle(x)
     value = (_cos_of_parts if quadrant % 2 else _sin_of_parts)(high, low)
     return -value if quadrant >= 2 else value
 
 
-def cos(x: float) -> float:
-    """The cosine of an angle of at most 2**20 radians; nan beyond."""
+def cos(x: Any) -> Any:
+    """The cosine of an angle of at most 2**20 radians, or of each in an array; nan beyond."""
+    if isinstance(x, np.ndarray):
+        return _sin_of_each(x, 1)
     quadrant, high, low = _reduce_angle(x)
     value = (_sin_of_parts if quadrant % 2 else _cos_of_parts)(high, low)
     return -value if quadrant in (1, 2) else value
 
 
-def _reduce_angle(x: float) -> tuple[int, float, float]:
-    """The quadrant of an angle, and the rest in [-pi/4, pi/4] in two parts."""
-    if not abs(x) <= _FARTHEST:
+def _sin_of_each(x: np.ndarray, quarters: int) -> np.ndarray:
+    """The sines of angles to which so many quarters of a turn are added."""
+    reduced, high, low = _reduce_angle(x)
+    quadrants = (reduced + quarters) % 4
+    values = np.where(quadrants % 2 == 1, _cos_of_parts(high, low), _sin_of_parts(high, low))
+    return np.where(quadrants >= 2, -values, values)
+
+
+def _reduce_angle(x: Any) -> tuple[Any, Any, Any]:
+    """The quadrant of an angle, and the rest in [-pi/4, pi/4] in two parts; or those of each."""
+    quarters: Any
+    if isinstance(x, np.ndarray):
+        x = np.where(np.abs(x) <= _FARTHEST, x, math.nan)
+        quarters = np.rint(x * _PER_QUARTER)
+    elif not abs(x) <= _FARTHEST:
         return 0, math.nan, math.nan
-    quarters = round(x * _PER_QUARTER)
+    else:
+        quarters = round(x * _PER_QUARTER)
     first = x - quarters * _QUARTER_HIGH
     second = quarters * _QUARTER_MIDDLE
     rest = first - second
@@ -251,7 +299,7 @@ def _reduce_angle(x: float) -> tuple[int, float, float]:
     return quarters % 4, high, (rest - high) - third
 
 
-def _sin_of_parts(x: float, low: float) -> float:
+def _sin_of_parts(x: Any, low: Any) -> Any:
     """The sine of ``x + low`` in [-pi/4, pi/4]."""
     z = x * x
     v = z * x
@@ -259,10 +307,36 @@ def _sin_of_parts(x: float, low: float) -> float:
     return x - ((z * (0.5 * low - v * r) - low) - v * _S1)
 
 
-def _cos_of_parts(x: float, low: float) -> float:
+def _cos_of_parts(x: Any, low: Any) -> Any:
     """The cosine of ``x + low`` in [-pi/4, pi/4]."""
     z = x * x
     r = z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
     half = 0.5 * z
     w = 1.0 - half
     return w + (((1.0 - w) - half) + (z * r - x * low))
+
+
+def atan2(y: Any, x: Any) -> Any:
+    """The angle [radians] from the x axis to the point (x, y), or of each in arrays; 0 for none."""
+    y, x = np.asarray(y, float), np.asarray(x, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = _atan(np.where(y == 0.0, 0.0, np.abs(y) / np.abs(x)))
+    angle = np.where(x < 0.0, math.pi - (angle - _PI_LOW), angle)
+    return _plain(np.where(y < 0.0, -angle, angle))
+
+
+def _atan(x: np.ndarray) -> np.ndarray:
+    """The arc tangents of numbers from 0 on, infinite ones included."""
+    interval = np.searchsorted(_ATAN_BOUNDS, x, side="right")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reduced = np.choose(
+            interval,
+            [x, (2.0 * x - 1.0) / (2.0 + x), (x - 1.0) / (x + 1.0)]
+            + [(x - 1.5) / (1.0 + 1.5 * x), -1.0 / x],
+        )
+    z = reduced * reduced
+    w = z * z
+    odd = z * (_A0 + w * (_A2 + w * (_A4 + w * (_A6 + w * (_A8 + w * _A10)))))
+    even = w * (_A1 + w * (_A3 + w * (_A5 + w * (_A7 + w * _A9))))
+    rest = (reduced * (odd + even) - _ATAN_LOW[interval]) - reduced
+    return _ATAN_HIGH[interval] - rest

@@ -18,6 +18,7 @@ from pettingzoo import ParallelEnv
 from dess.base.errors import InputError, check_known
 from dess.envs.observations.components import Components, component_bounds
 from dess.envs.observations.observer import Observer, rows_of
+from dess.envs.options import with_known_options
 from dess.envs.render import Window, draw
 from dess.envs.stepper import OUTCOME, MissionStepper, checked_actions
 from dess.model.record import MissionRecord
@@ -58,6 +59,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         "is_parallelizable": True,
     }
 
+    @with_known_options
     def __init__(
         self,
         scenario: AnyScenario,

@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from dess.envs.options import with_known_options
 from dess.envs.parallel import HarvestEnv
 from dess.model.state import check_seed
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
@@ -29,6 +30,7 @@ class HarvestSingleEnv(gymnasium.Env[Any, int]):
 
     metadata = HarvestEnv.metadata
 
+    @with_known_options
     def __init__(
         self,
         scenario: AnyScenario = "paper",

@@ -15,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from dess.base.errors import InputError, check_known
 from dess.envs.observations.observer import Observation, Observer, rows_of
+from dess.envs.options import with_known_options
 from dess.envs.stepper import OUTCOME, MissionStepper, Seeds, checked_actions
 from dess.model.record import Records
 from dess.model.state import ACTION_NAMES, TRUNCATED, State
@@ -60,6 +61,7 @@ class HarvestVectorEnv(VectorEnv):
         world: The nodes and the tables of the channel.
     """
 
+    @with_known_options
     def __init__(
         self,
         scenario: AnyScenario,

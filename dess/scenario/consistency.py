@@ -17,6 +17,7 @@ from dess.physics.fleet import IN_UNITS, legs, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
 from dess.scenario.places import Projection
+from dess.scenario.weather import ALWAYS, DAYLIGHT
 
 # Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70
 # bytes each, and less than a second of compiled code to draw them all.
@@ -34,7 +35,7 @@ MOST_ENTRIES = 2**30
 
 def problems(c: Fields) -> Iterator[InputError]:
     """What is wrong with a scenario, each with what is allowed."""
-    for check in (_off_the_grid, _distorted, _too_large, _unreachable, _unfit):
+    for check in (_off_the_grid, _distorted, _too_large, _unreachable, _unfit, _unfit_weather):
         yield from check(c)
 
 
@@ -222,6 +223,32 @@ def _unfit(c: Fields) -> Iterator[InputError]:
             f"{[low, high]} is not a range",
             f"a number 0..{MOST_DATA:,} or [low, high] with 0 <= low <= high <= {MOST_DATA:,}",
         )
+
+
+def _unfit_weather(c: Fields) -> Iterator[InputError]:
+    """Weather has a data sheet that tells in which of it UAVs can fly, and a sea under its sun."""
+    weather = c.weather
+    if not weather.is_on:
+        return
+    if not c.data_sheet.is_on:
+        yield InputError("weather", "needs a data sheet", "a data_sheet with max_speed")
+        return
+    if not c.data_sheet.max_speed:
+        form = DataSheet.form_of("max_speed")
+        yield InputError("data_sheet.max_speed", "is missing, and weather needs it", form)
+    if c.quota or not c.landing:
+        yield InputError(
+            "weather", "needs quota = 0 and landing = true", "as a data sheet has them"
+        )
+    if c.needs_events:
+        yield InputError("weather", "needs slotted arrivals", 'arrivals.process = "slotted"')
+    if weather.operating == DAYLIGHT and c.centre is None:
+        allowed = "nodes or zones in degrees, or centre; always, or hours such as 06:00-18:00"
+        yield InputError("weather.operating", "daylight needs a sea with degrees", allowed)
+    has_clock = weather.operating not in (ALWAYS, DAYLIGHT)
+    if has_clock and c.centre is None and weather.longitude is None:
+        allowed = "weather.longitude, or nodes or zones in degrees"
+        yield InputError("weather.operating", "solar time needs a longitude", allowed)
 
 
 def _unfit_to_fly(c: Fields) -> Iterator[InputError]:

@@ -20,6 +20,7 @@ from dess.physics.fleet import UavType
 from dess.physics.radio import Radio
 from dess.physics.section import Integer, Number, Section, Strict, tuples
 from dess.scenario.data_sheet import DataSheet, Units
+from dess.scenario.weather import Weather
 
 # Section VI-A: all combinations of five columns and five rows.
 PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
@@ -35,7 +36,7 @@ MOST_DATA = MOST_AMOUNT
 # The fields that go beyond the paper.
 SECTIONS = (
     *("arrivals", "age", "charging", "radio", "failures", "wind", "consumption", "fleet"),
-    "data_sheet",
+    *("data_sheet", "weather"),
 )
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
@@ -281,6 +282,7 @@ class Fields(Strict):
         ),
     )
     data_sheet: DataSheet = DataSheet.off()
+    weather: Weather = Weather.off()
 
     @property
     def snr_distance(self) -> float:
@@ -466,6 +468,8 @@ def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     replaced = {pads_of_zones for for_all, pads_of_zones in _EACH.items() if for_all in above}
     if "nodes" in values:  # the names are those of others
         replaced |= {"names", "moved"}
+    if "weather.file" in above:
+        replaced.add("weather.digest")
     below = {name: value for name, value in below.items() if name not in replaced}
     for name, value in (below | above).items():
         section, _, part = name.partition(".")

@@ -10,11 +10,11 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -45,12 +45,14 @@ _LONGEST = 270
 # of it UAVs are kept out [degrees].
 _SIDES, _MOST_RADIUS, _FAR = 64, 10**6, 90
 # Readers of other packages: entry points whose names are file endings, as ".kml", and whose values
-# are functions of a path that return ``Places``.
+# are functions of a path that return ``Places``; for weather, times and columns
+# (``dess.scenario.weather.formats``).
 GROUP = "dess.readers"
 # What a feature consists of, as GeoJSON calls it.
 POINT, LINE, POLYGON = "Point", "LineString", "Polygon"
 _GEOJSON = "a GeoJSON FeatureCollection"
 
+Read = TypeVar("Read")
 Size = tuple[int, int]  # cells of the grid from west to east, and from north to south
 Shape = tuple[str, list[np.ndarray]]  # POINT, LINE or POLYGON, and its rings of (K, 2) places
 
@@ -222,17 +224,26 @@ def read_places(path: Path, others: Iterable[str] = ()) -> Places:
     ending = path.suffix.lower()
     if ending in READERS:
         return READERS[ending](path)
+    return read_by_others(path, Places, [*others, *READERS])
+
+
+def read_by_others(path: Path, kind: Callable[..., Read], others: Iterable[str]) -> Read:
+    """What the reader of another package reads in a file (``GROUP``).
+
+    Args:
+        path: The file.
+        kind: What is made of the items that it returns.
+        others: Endings that are read here, for the message.
+
+    Raises:
+        InputError: If no reader knows the ending, or the file cannot be read.
+    """
     added = {point.name: point for point in entry_points(group=GROUP)}
-    if ending not in added:
-        endings = [*others, *READERS, *added]
-        raise InputError(path, "has no known file ending", ", ".join(endings))
-    return _read_by(added[ending], path)
-
-
-def _read_by(point: EntryPoint, path: Path) -> Places:
-    """The places in a file by the reader of another package."""
+    point = added.get(path.suffix.lower())
+    if point is None:
+        raise InputError(path, "has no known file ending", ", ".join([*others, *added]))
     try:
-        return Places(*point.load()(path))
+        return kind(*point.load()(path))
     except InputError:
         raise
     except Exception as error:  # code of others may raise anything; name it
@@ -252,13 +263,8 @@ def read_table(path: Path) -> Places:
         InputError: If it cannot be read, has other columns, or a place is no number.
     """
     try:
-        text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a CSV file").lstrip("\r\n")
-        first, _, others = text.partition("\n")
-        named = _NAMED_DELIMITER.fullmatch(first.rstrip("\r"))
-        delimiter = max(",;\t", key=first.count)
-        if named:
-            delimiter = named[1]
-            text = f"\n{others}"  # so that the numbers of lines stay
+        text = read_text(path, TEXT_LIMIT, "utf-8-sig", "a CSV file")
+        text, delimiter = without_delimiter(text)
         lines = csv.reader(io.StringIO(text), strict=True, delimiter=delimiter)
         columns = [name.strip() for name in next(filter(None, lines), [])]
         rows = [(f"line {lines.line_num}", row) for row in lines if any(map(str.strip, row))]
@@ -283,6 +289,20 @@ def read_table(path: Path) -> Places:
         ]
         places.append(Place(line, values, [(POINT, [np.array([numbers])])]))
     return Places(is_geographic, places)
+
+
+def without_delimiter(text: str) -> tuple[str, str]:
+    """The text of a CSV file without the line that says what parts its columns, and what does.
+
+    The numbers of its lines stay. Without such a line, the first line tells the most frequent of
+    comma, semicolon and tab.
+    """
+    text = text.lstrip("\r\n")
+    first, _, others = text.partition("\n")
+    named = _NAMED_DELIMITER.fullmatch(first.rstrip("\r"))
+    if named:
+        return f"\n{others}", named[1]
+    return text, max(",;\t", key=first.count)
 
 
 def number_of(text: str, place: str) -> float:

@@ -30,6 +30,7 @@ KINDS = {
     "dBm": ("a power", "20 dBm"),
     "dB at m": ("a ratio at a distance", "12 dB at 2 km"),
     "s at m/s": ("a time at a speed", "55 min at 8 m/s"),
+    "deg": ("a direction", "220 deg"),
     "m/s from deg": ("a speed and where it comes from", "10 m/s from SW"),
 }
 

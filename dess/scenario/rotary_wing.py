@@ -10,9 +10,12 @@ hovering takes in still air.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from dess.base.elementary import cos, sin
+import numpy as np
+
+from dess.base.elementary import cos, sin, sqrt
+from dess.physics.energy import ACTIONS, HOVERING
 
 # Shares of the power of the blades' profile and of the induced power when hovering, and the drag of
 # the fuselage [(m/s)^-3] of the UAV in that paper.
@@ -36,17 +39,17 @@ class RotaryWing(NamedTuple):
     induced_speed: float = INDUCED_SPEED
     drag: float = DRAG
 
-    def power(self, airspeed: float) -> float:
-        """The power at an airspeed [m/s], as a share of that of hovering in still air."""
+    def power(self, airspeed: Any) -> Any:
+        """The power at an airspeed [m/s], or at each, as a share of hovering in still air."""
         return self.power_without_drag(airspeed) + self.drag * airspeed * airspeed * airspeed
 
-    def power_without_drag(self, airspeed: float) -> float:
+    def power_without_drag(self, airspeed: Any) -> Any:
         """The power at an airspeed [m/s] without the drag of the fuselage."""
         of_tips = (airspeed / self.tip_speed) * (airspeed / self.tip_speed)
         # The difference of the paper's equation in a form that does not cancel at high speeds.
         half = (airspeed / self.induced_speed) * (airspeed / self.induced_speed) / 2
-        of_inflow = 1 / (math.sqrt(1 + half * half) + half)
-        return BLADES * (1 + 3 * of_tips) + INDUCED * math.sqrt(of_inflow)
+        of_inflow = 1 / (sqrt(1 + half * half) + half)
+        return BLADES * (1 + 3 * of_tips) + INDUCED * sqrt(of_inflow)
 
     def climbing_power(self, rate: float) -> float:
         """The power of a climb at a rate [m/s], as a share of that of hovering in still air.
@@ -64,19 +67,35 @@ class RotaryWing(NamedTuple):
         return self._replace(drag=drag)
 
 
-def airspeed_along(course: float, speed: float, wind: float, direction: float) -> float:
+def airspeed_along(course: float, speed: float, wind: Any, direction: Any) -> Any:
     """The airspeed [m/s] of a UAV that flies along a course at a ground speed.
 
     Args:
         course: The course [degrees from north, clockwise].
-        speed, wind: The ground speed and the wind [m/s].
-        direction: Where the wind comes from [degrees from north, clockwise].
+        speed: The ground speed [m/s].
+        wind: The wind [m/s], or an array of winds.
+        direction: Where it comes from [degrees from north, clockwise], or an array.
     """
-    against = cos(math.radians(direction - course))
-    across = sin(math.radians(direction - course))
-    ahead = speed + wind * against
-    beside = wind * across
-    return math.sqrt(ahead * ahead + beside * beside)
+    turned = direction - course
+    angle = np.radians(turned) if isinstance(turned, np.ndarray) else math.radians(turned)
+    ahead = speed + wind * cos(angle)
+    beside = wind * sin(angle)
+    return sqrt(ahead * ahead + beside * beside)
+
+
+def airspeeds_of(speed: float, wind: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(N, 5) the airspeeds [m/s] of the moves at a ground speed and of hovering, in N winds.
+
+    Args:
+        speed: The ground speed of the moves [m/s].
+        wind: (N,) the winds [m/s].
+        direction: (N,) where they come from [degrees from north, clockwise].
+    """
+    airspeeds = np.empty((len(wind), ACTIONS))
+    for action, course in enumerate(COURSES):
+        airspeeds[:, action] = airspeed_along(course, speed, wind, direction)
+    airspeeds[:, HOVERING] = wind
+    return airspeeds
 
 
 def largest_speed(other: float, direction: float, most: float) -> float:

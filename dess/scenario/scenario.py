@@ -24,7 +24,15 @@ from pydantic import (
 )
 
 from dess.base.descriptions import Description
-from dess.base.errors import InputError, check_type, form_of, shown, unknown_name, validated
+from dess.base.errors import (
+    InputError,
+    check_type,
+    form_of,
+    listed,
+    shown,
+    unknown_name,
+    validated,
+)
 from dess.base.files.reading import Shipped, parse_toml
 from dess.physics.fleet import UavType
 from dess.physics.section import Integer, Section, tuples
@@ -54,6 +62,7 @@ from dess.scenario.fields import (
 from dess.scenario.no_fly import notes_after, tell
 from dess.scenario.nodes import AMOUNTS
 from dess.scenario.own_sea import OwnSea, Positions, unread
+from dess.scenario.weather import REPLACED, Weather, in_weather
 
 # What a design calls the scenario of its points, if it differs from point to point.
 SEA = "scenario"
@@ -71,21 +80,21 @@ class Constants(Fields):
     @classmethod
     def _follow_the_data_sheet(cls, values: Any) -> Any:
         """Add the fields that follow from the data sheet, which may not be given as well."""
-        sheet = None
-        if isinstance(values, dict):
-            sheet = values.get("data_sheet")
-        try:
-            data_sheet = None
-            if sheet:
-                data_sheet = DataSheet.model_validate(sheet)
-        except ValidationError:  # it is told where the field is validated
-            return values
-        if not (data_sheet and data_sheet.is_on):
+        if not (isinstance(values, dict) and values.get("data_sheet")):
             return values
         values = {
             n: dict(given_value) if isinstance(given_value, Section) else given_value
             for n, given_value in values.items()
         }
+        try:
+            weather = Weather.model_validate(values.get("weather", {}))
+            if weather.is_on:
+                values["data_sheet"] = in_weather(values["data_sheet"], weather)
+            data_sheet = DataSheet.model_validate(values["data_sheet"])
+        except ValidationError:  # it is told where the field is validated
+            return values
+        if not data_sheet.is_on:
+            return values
         following = data_sheet.fields()
         for name in sorted(following.keys() & dotted(values).keys() - {*OPEN}):
             raise InputError(name, "follows from the data sheet", "without this field")
@@ -276,7 +285,7 @@ def _of_values(
 ) -> ScenarioSpace:
     """The scenario of the values that its file has, and of those that replace them."""
     read.pop("description", None)
-    values = merged(read, overrides)
+    values = merged(_with_weather_beside(name_or_path, read), overrides)
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         beside = partial(_SCENARIOS.beside, name_or_path)
@@ -288,10 +297,32 @@ def _of_values(
         of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
         values = merged(placed, read_values)
         values = merged(values, of_nodes)
+    _tell_of_weather(where, values)
     space = validated(ScenarioSpace, values, where, context)
     if not is_scenario_name(str(name_or_path)) and distance_error(space) >= TOLD_ERROR:
         tell(f"{where}: {distance_sentence(space)}")
     return space
+
+
+def _with_weather_beside(name_or_path: str | Path, read: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a file; that of its weather has its whole path if it lies beside it."""
+    weather = read.get("weather")
+    if not isinstance(weather, dict) or is_scenario_name(str(name_or_path)):
+        return read
+    beside = Path(name_or_path).parent / str(weather.get("file"))
+    if not beside.exists() or "file" not in weather:
+        return read
+    return {**read, "weather": {**weather, "file": str(beside.absolute())}}
+
+
+def _tell_of_weather(where: str, values: dict[str, Any]) -> None:
+    """Tell what of a data sheet the weather takes the place of."""
+    sheet = values.get("data_sheet")
+    if not (values.get("weather") and isinstance(sheet, dict)):
+        return
+    names = [f"data_sheet.{name}" for name in REPLACED if sheet.get(name)]
+    if names:
+        tell(f"{where}: the series of weather.file takes the place of {listed(names)}")
 
 
 def positions_in(name_or_path: str | Path, /, **overrides: Any) -> Positions:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -90,7 +90,7 @@ def sweep(
         policies,
         missions,
         seed,
-        options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        _prices_of(price),
         options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         folder=results,
@@ -127,6 +127,7 @@ def what_if(
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
+    price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     shown: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
     results: Annotated[Path, typer.Option(metavar="DIR")] = options.RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR")] = options.PAGES,
@@ -144,6 +145,7 @@ def what_if(
         policy: A policy, or several that the UAVs follow in turn, compared with itself;
             repeatable.  [default: the best that five minutes allow, and greedy]
         missions: Missions of every policy on each side.
+        price: A price, as for dess sweep; then the costs of both sides are compared. Repeatable.
         shown: The policy whose missions are drawn.  [default: the best one in the variation]
         results: Folder in which the results are stored, as what-if/HASH.
         out: Folder of the page.
@@ -154,7 +156,10 @@ def what_if(
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
-    question = what_if_question(changes, fixed, scenario, policy, missions, seed, results)
+    prices = _prices_of(price)
+    question = what_if_question(
+        changes, fixed, scenario, policy, missions, seed, results, prices=prices
+    )
     check_shown(question, shown)
     asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
     answer = VariationAnswer(asked_results, question, shown)
@@ -165,6 +170,7 @@ def what_if(
         "policies": [*map(str, question.study.policies)],
         "missions": missions,
         "seed": seed,
+        "prices": prices or None,
         "shown": shown,
     }
 
@@ -252,6 +258,11 @@ def _print_answer(
         print(json.dumps({**about, **told, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")
+
+
+def _prices_of(options_given: list[str] | None) -> dict[str, Any]:
+    """The prices that a command names."""
+    return options.parse_all_settings(map(_with_quotes, options_given or []), "--price", PRICE)
 
 
 def _with_quotes(text: str) -> str:

@@ -23,6 +23,7 @@ policies = ["planner-short", "greedy"]  # None: the best that five minutes allow
 missions = 300  # number of missions of every policy, in the baseline and in the variation
 seed = 0  # seed of the missions
 workers = 1  # processes; more than one is worth its start time from thousands of missions on
+prices = None  # such as {"uav": 20_000}: then costs are compared as well
 yes = False  # True if the missions may take more than an hour
 shown = None  # the policy whose missions are drawn; None for the best in the variation
 
@@ -41,9 +42,8 @@ from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.tables import make_table
 
 # %%
-asked = what_if(
-    settings, baseline, scenario, policies, missions, seed, results, workers, shown=shown, yes=yes
-)
+question = settings, baseline, scenario, policies, missions, seed, results, workers
+asked = what_if(*question, prices=prices, shown=shown, yes=yes)
 found = asked.results
 variation = asked.variation
 
@@ -52,14 +52,16 @@ make_answer(asked.headline())
 
 # %%
 pairs = f"n = {missions:,} pairs per policy"
-lead_figure(variation.plot(), "Paired differences of the metrics", f"{pairs}; {tables.BARS}")
+caption = f"{variation.finding()}{pairs}; {tables.BARS}"
+lead_figure(variation.plot(), "Paired differences of the metrics", caption)
 
 # %%
 make_facts(asked.facts())
 
 # %%
 sides = found.scenario(0), found.scenario(1)
-make_panel(*sides, scenario, found.policies, seed, given=found.given_values(0))
+given, costs = found.given_values(0), found.study.costs
+make_panel(*sides, scenario, found.policies, seed, given=given, costs=costs)
 
 # %% [markdown]
 # ## Why
@@ -69,7 +71,8 @@ extended = [metric for metric in measured_columns(found) if found.missions[metri
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
 
 # %%
-spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
+spread = f"{variation.spread_in_words()}{pairs}."
+spread += " The lower panel ends at the 5 % and 95 % quantiles."
 make_gallery(
     [
         (variation.plot_spread(), "Distribution of the paired differences of the product", spread),
@@ -77,7 +80,7 @@ make_gallery(
             (
                 variation.plot_means(metric),
                 f"{metric_of(metric).name}, baseline and variation",
-                f"{metric_of(metric).name}. {caption}",
+                f"{variation.finding(metric)}{caption}",
             )
             for metric in (*metrics.METRICS, *extended)
         ),

@@ -104,12 +104,15 @@ _LEVELS = {
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
 }
+_MTBF = "data_sheet.mtbf"
 # What a data sheet says, in which units, times these factors.
 _OF_SHEET = {
     "data_sheet.data_rate": ("bit/s", (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)),
     "data_sheet.wind": ("m/s from deg", (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)),
+    _MTBF: ("s", (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0)),
 }
-_RATES = ("failures.uav_rate",)  # settings that are told as the mean time between events
+# How often UAVs fail, which is told as the mean time between failures.
+_FAILURES = ("failures.uav_rate", _MTBF)
 _EXAMPLE_SETTINGS = ("uavs", "pads", "arrival_rate")
 _SIDE = 8  # of the grid, the most numbers of UAVs and of pads
 # What a search can require, by the names of the command line.
@@ -466,6 +469,10 @@ def _settings_of(
     """The settings of the panel: by field, the values that the scenario allows, in their order."""
     ours, theirs = (dotted(space.model_dump(mode="json")) for space in (baseline, variation))
     differing = [key for key in ours | theirs if ours.get(key) != theirs.get(key)]
+    if _MTBF in differing and not all(space.value(_MTBF) for space in (baseline, variation)):
+        # The sheet of one side says nothing of failures: they are told by what follows from it.
+        differing = [key for key in differing if key not in (_MTBF, "data_sheet.repair")]
+        differing.append("failures.uav_repair")
     # Another line of the data sheet would change the same words of the arrays.
     has_other_sheet = any(key.startswith("data_sheet.") for key in {*differing} - {*_OF_SHEET})
     for key in _OFFERED:
@@ -479,9 +486,11 @@ def _settings_of(
         ordered = _in_order(key, [*allowed, *present])
         if len(ordered) > 1:
             yield key, ordered
+            differing = [other for other in differing if other != key]
     for key in differing:
-        if key not in _OFFERED:
-            yield key, [_value_of(space, key) for space in (baseline, variation)]
+        values = [_value_of(space, key) for space in (baseline, variation)]
+        if values[0] != values[1]:
+            yield key, values
 
 
 def _candidates_of(space: ScenarioSpace, key: str, present: Sequence[Any]) -> Sequence[Any]:
@@ -582,9 +591,9 @@ def _describe_setting(
         place = " in zone 1"
     name, unit = field.name, field.unit
     texts = [value_text(value) for value in values]
-    if key in _RATES:
+    if key in _FAILURES:
         name, unit = _failure_in_words(space), ""
-        texts = [_time_between(rate, space.units) for rate in values]
+        texts = [_time_between(value, space.units) for value in values]
     if key in _OF_SHEET and not isinstance(values[0], str):
         listed = _amount_of(key, space.plain_value(key))
         texts = [f"{_amount_of(key, of_nodes) / listed:g} times the sheet's" for of_nodes in values]
@@ -600,8 +609,10 @@ def _describe_setting(
     }
 
 
-def _time_between(rate: float, units: Units | None) -> str:
-    """A rate per mission slot as the mean time from one event to the next."""
+def _time_between(rate: float | str, units: Units | None) -> str:
+    """A rate per mission slot, or a time, as the mean time from one event to the next."""
+    if isinstance(rate, str):
+        return f"one every {rate}"
     if rate == 0.0:
         return "none"
     if units is None:

@@ -16,7 +16,7 @@ from dess.analysis.answers.settings.points import (
 from dess.analysis.metrics import (
     METRICS,
     check_metric,
-    metric_in_missions,
+    metric_in_groups,
     metric_of,
 )
 from dess.analysis.results.tables import Results
@@ -79,12 +79,18 @@ def compare_with_baseline(
         parts = []
         for policy, missions in results.missions.groupby("policy", sort=False):
             wide = by_replication(missions, metric, "point")
-            measure = metric_in_missions(results.missions, metric)
+            measure = metric_in_groups(missions, metric, ["point"], wide.columns.to_frame())
             others = wide.drop(columns=point)
             looks = results.looks(str(policy))
             # The pairs end with the missions of the one that has fewer.
             seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
-            tests = column_tests(others, wide[point], measure, level_after(seen))
+            is_other = wide.columns != point
+            ranges = (
+                measure.at(is_other),
+                level_after(seen),
+                measure.at(wide.columns.get_loc(point)),
+            )
+            tests = column_tests(others, wide[point], *ranges)
             tests["p"] = (tests["p"] * np.maximum(seen * (seen + 1), 1)).clip(upper=1)
             tests = tests[tests["n"] > 0].join(values_of_points(results)).reset_index()
             parts.append(tests.assign(metric=metric, policy=policy))

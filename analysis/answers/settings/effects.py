@@ -5,7 +5,6 @@ main_effects(results)  # by each field
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -22,7 +21,6 @@ from dess.analysis.metrics import (
     Metric,
     check_metric,
     metric_in_groups,
-    metric_in_missions,
     metric_of,
     metrics_in,
 )
@@ -35,6 +33,8 @@ from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
+# The columns that say how a mean compares with the others, see ``average_over_others``.
+JUDGED = ("standing", "tied", "selected")
 MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
 
@@ -59,8 +59,8 @@ def average_over_others(
         A row per policy and combination, in the order of the study: ``policy``, the fields,
         ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` (number of points that
         the mean is taken over), ``standing``: how the combination compares with the others of this
-        policy (``stats.alternatives.judge_alternatives``), and ``tied``: whether it may be the best
-        by what was seen.
+        policy (``stats.alternatives.judge_alternatives``), ``tied``: whether it may be the best by
+        what was seen, and ``selected``: whether it is the design point that the study selects.
 
     Raises:
         InputError: If there is no such field, metric or policy.
@@ -153,7 +153,6 @@ def _average_labelled(
     sizes = np.bincount(cell_of_points)
     check_metric(metric, results.missions)
     missions = results.missions_of(policy)
-    measure = metric_in_missions(results.missions, metric)
     design = results.manifest["study"]["design"] or {}
     if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
         last = len(design["ranges"]) + 2
@@ -179,10 +178,15 @@ def _average_labelled(
         if (sizes == 1).all():  # a cell is a design point
             left[cell_of_points] = points_left(results, str(name))[points]
         verdicts = judge_alternatives(
-            wide.to_numpy(float), ends["low"], ends["high"], measure, seen, left
+            wide.to_numpy(float), ends["low"], ends["high"], of_cells, seen, left
         )
         table = pd.concat([cells, ends], axis=1)
-        table = table.assign(points=sizes, standing=verdicts, tied=may_lead(verdicts))
+        selected = np.zeros(len(cells), bool)
+        if (choice := results.choice(str(name))) is not None:
+            best_cell = cell_of[choice.best]
+            selected[best_cell] = best_cell >= 0 and sizes[best_cell] == 1
+        judged = verdicts, may_lead(verdicts), selected
+        table = table.assign(points=sizes, **dict(zip(JUDGED, judged, strict=True)))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -200,15 +204,12 @@ def _intervals_over_points(
         levels: The confidence level of every cell.
     """
     rows = []
-    cells = cell_of.max() + 1
-    least, most = (np.broadcast_to(end, cells) for end in metric.range)
-    for cell in range(cells):
+    for cell in range(cell_of.max() + 1):
         complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
         level = float(levels[cell])
         ends = Interval(np.nan, np.nan, np.nan)
         if len(complete):
-            of_cell = replace(metric, least=float(least[cell]), most=float(most[cell]))
-            ends = stratified_interval(complete, of_cell, level)
+            ends = stratified_interval(complete, metric.at(cell), level)
         rows.append((*ends, len(complete)))
     return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
 
@@ -235,6 +236,4 @@ def effect_table(results: Results, metric: str) -> Table:
         rows.append((field_named(str(field)).name, policy, *both, span))
     heads = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
     caption = f"The effect of each field on {measure.within}, averaged over the others"
-    return Table(
-        pd.DataFrame(rows, columns=heads), caption, effects.drop(columns=["standing", "tied"])
-    )
+    return Table(pd.DataFrame(rows, columns=heads), caption, effects.drop(columns=list(JUDGED)))

@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 
 from dess.analysis import numbers
 from dess.analysis.answers.settings.effects import (
+    JUDGED,
     average_over_others,
     fields_by_influence,
     main_effects,
@@ -25,7 +26,7 @@ from dess.analysis.answers.settings.effects import (
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.answers.settings.shapes import compare_values_by_field
-from dess.analysis.figures import Drawing, name_best_mean, style
+from dess.analysis.figures import Drawing, best_place, name_best_mean, style
 from dess.analysis.metrics import METRICS, PRODUCT, Metric, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
@@ -81,7 +82,7 @@ def draw_curves(
     caption = name_best_mean(data, metric, ["policy", x, *filter(None, [hue])])
     caption += f"n = {counted_missions(data)} missions per {mark}; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} against the {field_named(x).within}"
-    return Drawing(drawing, alt, caption, data)
+    return Drawing(drawing, alt, caption, data.drop(columns="selected"))
 
 
 def plot_curves(
@@ -161,11 +162,7 @@ def draw_heat_map(
         column=rows[x].map(values[x].index),
         text=[_format_cell(mean, measure) if has_room else "" for mean in rows["mean"]],
     )
-    leading = rows[rows["tied"]]
-    if measure.less_is_better:
-        best = leading["mean"].idxmin()
-    else:
-        best = leading["mean"].idxmax()
+    best = best_place(rows, metric)
     least, most = _range_of_colours(rows["mean"], measure)
     scale = {"vmin": least, "vmax": most, "cmap": "YlGnBu"}
     if measure.less_is_better:
@@ -212,7 +209,7 @@ def draw_heat_map(
     if (rows["standing"] == SEEN_WORSE).any():
         caption += _DOTTED
     alt = f"{measure.name} of {policy} over {_fields_in_words(named)}"
-    return Drawing(figure, alt, caption, data)
+    return Drawing(figure, alt, caption, data.drop(columns="selected"))
 
 
 def _range_of_colours(means: pd.Series, metric: Metric) -> tuple[float, float]:
@@ -272,7 +269,7 @@ def draw_main_effects(
         f"bars are {INTERVALS}."
     )
     alt = f"{measure.name} against each field, averaged over the others"
-    return Drawing(drawing, alt, caption, effects.drop(columns=["standing", "tied"]))
+    return Drawing(drawing, alt, caption, effects.drop(columns=list(JUDGED)))
 
 
 def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Drawing:

@@ -37,7 +37,6 @@ from dess.analysis.metrics import (
     check_ranking_metric,
     format_length,
     metric_in_groups,
-    metric_in_missions,
     metric_of,
     metrics_in,
     ranking_column,
@@ -203,7 +202,6 @@ def rank_settings(
     seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
-        measure = metric_in_missions(missions, name)
         wide = by_replication(missions, name, cell)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
         of_cells = metric_in_groups(missions, name, cell, table)
@@ -213,9 +211,9 @@ def rank_settings(
     values = wide.to_numpy(float)
     left = np.array([points_left(results, row.policy)[row.point] for row in table.itertuples()])
     ends = table[f"{metric}_low"], table[f"{metric}_high"]
-    table["standing"] = judge_alternatives(values, *ends, measure, seen, left)
+    table["standing"] = judge_alternatives(values, *ends, of_cells, seen, left)
     table["tied"] = may_lead(table["standing"].to_numpy())
-    table = table.iloc[_order_settings(results, table, values, measure)].reset_index(drop=True)
+    table = table.iloc[_order_settings(results, table, values, of_cells)].reset_index(drop=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
     return table
 

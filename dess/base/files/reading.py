@@ -70,6 +70,23 @@ def read_bytes(path: Path, limit: int = TEXT_LIMIT, allowed: str = "a file") -> 
     return content
 
 
+def version_of(path: Path) -> tuple[int, int]:
+    """The time of the last change [ns] and the size of a file; what was read holds with them.
+
+    Raises:
+        Missing: If there is no such file.
+        InputError: If it cannot be looked at.
+    """
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise Missing(path, "no such file", "a file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(path, f"cannot be read: {reason}", "a file") from None
+    return found.st_mtime_ns, found.st_size
+
+
 def hash_file(path: Path, limit: int) -> str:
     """The SHA-256 hash of the content of a regular file; errors are those of ``read_text``."""
     return sha256(read_bytes(path, limit)).hexdigest()

@@ -12,6 +12,7 @@ import torch
 from gymnasium import spaces
 from pufferlib.models import Default
 
+from dess.envs.options import with_known_options
 from dess.envs.vector import vector_env
 from dess.scenario.scenario import AnyScenario
 
@@ -24,6 +25,7 @@ class HarvestPufferEnv(pufferlib.PufferEnv):
     The infos are a list: the mission's return and whether it succeeded, when missions have ended.
     """
 
+    @with_known_options
     def __init__(
         self,
         scenario: AnyScenario,

@@ -87,6 +87,16 @@ def test_the_caption_names_the_best_mean():
     assert name_best_mean(rows.assign(mean=1.0), PRODUCT, ["uavs"]) == ""
 
 
+def test_the_caption_names_no_setting_that_is_ruled_out():
+    """A mean of few missions may be the highest although the setting is ruled out."""
+    rows = pd.DataFrame({"uavs": [1, 2, 3], "mean": [0.6, 0.9, 0.7], "tied": [True, False, True]})
+    left = "The highest mean of what is not ruled out is 70.0 %, of 3 UAVs. "
+    assert name_best_mean(rows, PRODUCT, ["uavs"]) == left
+    selected = rows.assign(selected=[True, False, False])
+    own = "The highest mean of what the study selects is 60.0 %, of 1 UAV. "
+    assert name_best_mean(selected, PRODUCT, ["uavs"]) == own
+
+
 def test_few_lines_have_their_names_beside_them_and_many_a_legend():
     """Names of lines that end at the same place are moved apart."""
     rows = pd.DataFrame({"point": [0, 1] * 3, "policy": [*"aabbcc"], "metric": SUCCESS})

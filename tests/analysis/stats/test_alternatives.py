@@ -1,10 +1,12 @@
 """Which of several settings may be the best."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dess.analysis.metrics import MOST_SLOTS, SUCCESS, metric_in_missions
+from dess.analysis.metrics import MOST_SLOTS, SUCCESS, metric_in_missions, metric_of
 from dess.analysis.stats.alternatives import may_be_best
 from dess.analysis.stats.differences import difference_test
 
@@ -77,3 +79,12 @@ def test_shares_are_judged_as_the_test_of_shares_does():
 def test_settings_without_common_replications_are_not_compared():
     values = np.array([[1.0, np.nan], [1.1, np.nan], [np.nan, 9.0], [np.nan, 9.1]])
     assert may_be_best(values).all()
+
+
+def test_each_setting_has_a_rare_mission_of_its_own_range():
+    """One that cannot wait has no rare wait, so one that did wait in each mission is ruled out."""
+    waits = np.column_stack([np.zeros(100), np.random.default_rng(5).uniform(3, 5, 100)])
+    shared = replace(metric_of("waiting"), most=400.0)
+    assert may_be_best(waits, shared).all()
+    own = replace(shared, most=np.array([0.0, 400.0]))
+    assert may_be_best(waits, own).tolist() == [True, False]

@@ -11,6 +11,7 @@ from dess.analysis.metrics import (
     LEAST_COST,
     MOST_COST,
     MOST_SLOTS,
+    MOST_WAITING,
     PRODUCT,
     REWARD,
     SUCCESS,
@@ -22,6 +23,8 @@ from dess.analysis.stats.differences import (
     column_tests,
     compare,
     compare_pairs,
+    compare_unpaired,
+    relative_change,
 )
 
 METRIC = "collection_ratio"
@@ -237,3 +240,44 @@ def test_equal_values_do_not_rule_out_a_failure(metric, value, column, largest, 
     alike = pd.Series(np.full(100, value))
     table = column_tests(alike.to_frame("a"), alike, metric_in_missions(missions, metric))
     assert table.loc["a", ["low", "high"]].tolist() == pytest.approx([*expected])
+
+
+def waits():
+    """Missions with pads for all UAVs at points 0 and 2, and with too few at point 1."""
+    rows = pd.DataFrame({"point": np.repeat(range(3), 20), "replication": np.tile(range(20), 3)})
+    waited = np.where(rows["point"] == 1, np.tile([0.0, 0.0, 0.0, 3.0], 15), 0.0)
+    rows = rows.assign(waiting=waited, queue=waited / 50)
+    return rows.assign(**{MOST_WAITING: np.where(rows["point"] == 1, 400, 0), MOST_SLOTS: 400})
+
+
+@pytest.mark.parametrize("metric", ["waiting", "queue"])
+def test_where_nobody_can_wait_the_others_do_not_wait_less(metric):
+    alone = compare(waits(), 0, [metric], of="point").set_index("point")
+    assert alone["low"].min() >= 0 and alone.loc[2, ["low", "high"]].tolist() == [0, 0]
+    assert 0 < alone.loc[1, "difference"] < alone.loc[1, "high"]
+    back = compare(waits(), 1, [metric], of="point")
+    assert (back["high"] <= 0).all() and (back["low"] < back["difference"]).all()
+
+
+def test_policies_that_cannot_wait_do_not_differ_in_their_waits():
+    both = pd.concat([waits().assign(policy=policy) for policy in ("tour", "greedy")])
+    rows = compare(both, "tour", ["waiting"], by=["point"])
+    assert rows[["low", "high"]].to_numpy()[[0, 2]].tolist() == [[0, 0], [0, 0]]
+    assert rows.loc[1, "low"] < 0 < rows.loc[1, "high"]
+
+
+def test_columns_and_ratios_have_the_ranges_of_both_sides():
+    none = metric_in_missions(waits().query("point == 0"), "waiting")
+    some = metric_in_missions(waits().query("point == 1"), "waiting")
+    waited = waits()["waiting"].to_numpy()[20:40]
+    table = column_tests(
+        pd.DataFrame({"a": waited}), pd.Series(0 * waited), some, metric_of_baseline=none
+    )
+    assert table.loc["a", "low"] == 0 < table.loc["a", "high"]
+    changed = relative_change(0 * waited, waited, none, some)
+    assert changed == (-1, -1, -1)
+
+
+def test_intervals_of_unpaired_shares_end_where_these_do():
+    far = compare_unpaired([1.0, 1.0], [0.0, 0.0], PRODUCT)
+    assert far.low > -1 and far.high == 1.0

@@ -74,6 +74,39 @@ def test_errors_are_below_one_unit_in_the_last_place(name):
     assert getcontext().prec == 28
 
 
+@pytest.mark.parametrize("name", ["sin", "cos", "sqrt"])
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_arrays_have_the_bits_of_their_numbers(name):
+    numbers = np.array([x for [x] in _arguments("sin")] + [0.0, 2e6, math.nan])
+    numbers = np.abs(numbers) if name == "sqrt" else numbers
+    function = getattr(elementary, name)
+    each = np.array([function(x) for x in numbers.tolist()])
+    assert function(numbers).tobytes() == each.tobytes()
+
+
+def test_angles_of_points_are_within_two_units_in_the_last_place():
+    """Sine and cosine of the exact angle are those of the point: y cos - x sin is its error."""
+    draw = np.random.default_rng(2)
+    x, y = draw.normal(size=(2, 300)) * 10.0 ** draw.uniform(-5, 5, (2, 300))
+    angles = elementary.atan2(y, x)
+    with localcontext() as context:
+        context.prec = 60
+        for angle, *point in zip(angles.tolist(), x.tolist(), y.tolist(), strict=True):
+            px, py = map(Decimal, point)
+            exact = Decimal(angle)
+            across = py * _sine(exact + PI / 2) - px * _sine(exact)
+            error = abs(across) / (px * px + py * py).sqrt()
+            assert error < 2 * Decimal(math.ulp(angle)), point
+
+
+def test_angles_at_the_axes():
+    points = {(0, 1): 0.0, (1, 0): 0.5, (0, -1): 1.0, (-1, 0): -0.5, (1, 1): 0.25, (-1, -1): -0.75}
+    for (y, x), half_turns in points.items():
+        assert elementary.atan2(y, x) == half_turns * math.pi
+    assert elementary.atan2(0.0, 0.0) == 0.0
+    assert math.isnan(elementary.atan2(math.nan, 1.0))
+
+
 def test_powers_of_ten_have_whole_logarithms():
     numbers = np.array([float(f"1e{k}") for k in range(-307, 309)])
     assert elementary.log10(numbers).tolist() == [*range(-307, 309)]

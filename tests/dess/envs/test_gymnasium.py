@@ -152,8 +152,21 @@ def test_a_lone_uav_takes_integers_alone(action):
     ):
         env.step(action)
     env.step(np.array(4))
-    with pytest.raises(TypeError, match="unexpected keyword argument 'mask'"):
-        dess.single_env("paper", mask="observation")  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(
+    "make, options, line",
+    [
+        (dess.single_env, {"mask": "info"}, "'mask' is unknown; allowed: scenario, seed, render"),
+        (dess.parallel_env, {"guard": True}, r"'guard' is unknown \(did you mean guarded\?\)"),
+        (dess.vector_env, {"num_envs": 2, "ended": "stay"}, "'ended' is unknown; allowed: scen"),
+    ],
+)
+def test_a_keyword_that_an_environment_lacks_is_refused_in_a_line(make, options, line):
+    with pytest.raises(InputError, match=f"^options: {line}"):
+        make("paper", **options)
+    with pytest.raises(InputError, match="^options: 'mask' is unknown"):
+        gymnasium.make("dess.envs:dess/Paper-v0", mask="info")
 
 
 def test_a_list_in_the_place_of_an_action_is_refused():

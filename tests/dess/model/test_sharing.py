@@ -99,7 +99,7 @@ VARIED: dict[str, Any] = {
 # They change no mission: names, what places are called, and where on Earth they are; or the SimPy
 # engine alone has them; or other fields follow from them.
 WITHOUT_EFFECT = {
-    *("names", "moved", "centre", "data_sheet"),
+    *("names", "moved", "centre", "data_sheet", "weather"),
     *("arrivals.process", "arrivals.schedule", "arrivals.buffer", "arrivals.service"),
 }
 
@@ -115,7 +115,11 @@ def _leaves() -> Iterator[str]:
     """The fields of scenarios and of their sections, as ``section.field``."""
     for name, field in ScenarioSpace.model_fields.items():
         section = field.default
-        if name in fields.SECTIONS and hasattr(section, "off") and name != "data_sheet":
+        if (
+            name in fields.SECTIONS
+            and hasattr(section, "off")
+            and name not in ("data_sheet", "weather")
+        ):
             yield from (f"{name}.{inner}" for inner in type(section).model_fields)
         else:
             yield name

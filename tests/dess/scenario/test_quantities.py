@@ -81,7 +81,7 @@ def test_the_docs_list_every_unit():
     """Row by row, with all spellings: the list is that of the code, which needs no library."""
     page = PAGES["docs/how-to/data-sheet.md"].partition("## Units")[2].partition("\n## ")[0]
     rows = dict(re.findall(r"^\| ([a-z ]+) \| (.*?) \|", page, re.M))
-    kinds = {KINDS.get(unit, ("a direction", ""))[0].split(" ", 1)[1]: unit for unit in UNITS}
+    kinds = {KINDS[unit][0].split(" ", 1)[1]: unit for unit in UNITS}
     assert rows.keys() - {"what"} == kinds.keys()
     for kind, unit in kinds.items():
         listed = re.findall(r"`([^`]+)`", rows[kind])

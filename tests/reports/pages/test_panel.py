@@ -135,6 +135,36 @@ def test_wind_data_and_the_pads_of_every_zone_are_settings_where_there_is_a_shee
     image = make_image(space, ["greedy"], SEED, PORTION, settings)
     assert len(json.dumps(image.document()["sliders"])) < 10_000
     assert not {*panels._OF_SHEET, "zones.pads"} & {*dict(panels._settings_of(PAPER, PAPER))}
+    # A sheet without failures has them by their rate.
+    assert "failures.uav_rate" in settings and "data_sheet.mtbf" not in settings
+
+
+def test_failures_of_a_sheet_are_a_setting_in_its_words():
+    sea = load_scenario("jade-bight", **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
+    settings = dict(panels._settings_of(sea, sea))
+    values = settings["data_sheet.mtbf"]
+    assert values == ["5 h", "12.5 h", "25 h", "50 h", "100 h", "200 h", "500 h"]
+    assert "failures.uav_rate" not in settings
+    told = panels._describe_setting("data_sheet.mtbf", values, sea, "50 h")
+    assert told["texts"][0] == "one every 5 h" and told["default"] == 3
+    assert told["name"].endswith("grounded for 2 h in the mean")
+    made = make_image(sea, ["greedy"], SEED, PORTION, {"data_sheet.mtbf": values})
+    (slider,) = made.sliders
+    slider.apply(made.arrays, "5 h")
+    often = make_image(
+        ScenarioSpace.of(sea, **{"data_sheet.mtbf": "5 h"}), ["greedy"], SEED, PORTION
+    )
+    assert made.arrays["constants"].tobytes() == often.arrays["constants"].tobytes()
+
+
+def test_where_one_sheet_has_no_failures_the_sides_differ_by_what_follows_from_the_other():
+    sea = load_scenario("jade-bight")
+    failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
+    settings = dict(panels._settings_of(sea, failing))
+    assert not [key for key, values in settings.items() if values[0] == values[-1]]
+    sides = [panels._value_of(failing, key) for key in settings]
+    values = dict(zip(settings, sides, strict=True))
+    assert ScenarioSpace.of(sea, **values).failures == failing.failures
 
 
 def test_rates_of_nodes_are_told_as_shares_of_those_of_the_sheet():
@@ -336,7 +366,8 @@ def test_the_page_simulates_what_python_does(visit, document):
     command = opened.page.locator("[data-panel=command]").text_content()
     assert command == (
         "dess what-if --baseline uavs=1 --set uavs=2 --policy greedy --scenario paper "
-        f"--seed {SEED} --missions {MISSIONS}"
+        f"--seed {SEED} --missions {MISSIONS} --price uav=1000 --price pad=300 --price charge=40 "
+        "--price hour=0 --price missions=1 --price currency=EUR"
     )
     assert opened.complaints == []
     assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
@@ -471,6 +502,10 @@ def test_prices_are_changed(visit, document):
         records = simulate_batch(space, policies.load("greedy"), SEED, MISSIONS)
         charging = 40 * records.uavs["charged"].sum(axis=1).mean() / 100
         assert cell.startswith(f"{2500 * uavs + 300 * 16 + charging:,.0f} EUR [")
+    tab.locator("[name=b-policy]").select_option("tour")
+    what_if = str(tab.locator("[data-panel=command]").text_content())
+    assert " --policy greedy --policy tour " in what_if and "--price uav=2500 " in what_if
+    tab.locator("[name=b-policy]").select_option("greedy")
     tab.locator("[name=a-uavs]").press("ArrowRight")
     sweep = str(tab.locator("[data-panel=command]").text_content())
     assert sweep.startswith("dess sweep --set uavs=2 ") and "--price uav=2500 " in sweep
