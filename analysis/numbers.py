@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Sequence
 from types import MappingProxyType
+from typing import Literal
 
 import pandas as pd
 
@@ -122,15 +123,20 @@ def format_money(amount: float, currency: str) -> str:
     return f"{format_minus(text)} {currency}"
 
 
-def format_amounts(mean: float, low: float, high: float) -> str:
+def format_amounts(mean: float, low: float, high: float, sign: Literal["", "+"] = "") -> str:
     """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100.
 
-    A cost that is the same in every mission has no interval.
+    A cost that is the same in every mission has no interval. With ``sign``, amounts that are more
+    have a plus.
     """
     digits = 0 if abs(mean) >= 100 else 2
+
+    def write(amount: float) -> str:
+        return format_minus(f"{amount:{sign if amount else ''},.{digits}f}")
+
     if low == high:
-        return format_minus(f"{mean:,.{digits}f}")
-    return with_ends(lambda amount: format_minus(f"{amount:,.{digits}f}"), mean, low, high)
+        return write(mean)
+    return with_ends(write, mean, low, high)
 
 
 def format_seconds(time: float) -> str:

@@ -10,7 +10,8 @@ from typing import Any
 from dess.base.floors import check_floors
 from dess.model import batch, mission
 from dess.model.record import MissionRecord, Records
-from dess.scenario.scenario import AnyScenario
+from dess.scenario.scenario import AnyScenario, Constants, loaded
+from dess.scenario.weather import refuse_weather
 
 
 def simulate(
@@ -44,6 +45,8 @@ def simulate(
         ValueError: If a policy does not return actions.
     """
     team = load_policies(policy)
+    scenario = loaded(scenario)
+    refuse_weather([scenario.weather])
     return mission.simulate(scenario, team, seed, replication, events=events, processes=processes)
 
 
@@ -80,6 +83,10 @@ def simulate_batch(
             scenario or policy of a name.
         ValueError: If a policy does not return actions.
     """
+    if isinstance(scenario, str) or not isinstance(scenario, Sequence):
+        scenario = loaded(scenario)
+    spaces = [scenario] if isinstance(scenario, Constants) else scenario
+    refuse_weather(space.weather for space in spaces if isinstance(space, Constants))
     return batch.simulate_batch(
         scenario,
         load_policies(policy),

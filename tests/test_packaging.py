@@ -64,6 +64,15 @@ def test_the_wheel_has_the_notice_of_the_coefficients_that_it_uses(wheel):
     assert " ".join(notice.split()) in " ".join(source.split())
 
 
+def test_the_wheel_has_the_attribution_of_the_weather_that_it_ships(wheel):
+    [name] = [name for name in wheel.namelist() if name.endswith("licenses/LICENSE-era5")]
+    notice = " ".join(wheel.read(name).decode().split())
+    [shipped] = [name for name in wheel.namelist() if "/era5" in name]
+    assert shipped in notice
+    assert "contains modified Copernicus Climate Change Service information" in notice
+    assert "CC BY 4.0" in notice
+
+
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory):
     """This source tree as an unpacked archive."""

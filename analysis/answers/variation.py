@@ -8,6 +8,7 @@ The study has two design points: the baseline, then the variation.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,12 +23,14 @@ from dess.analysis.answers.missions import end_in_words, estimate_metric
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
+    COST,
     HOME,
     METRICS,
     MOST_SLOTS,
     PRODUCT,
     RATIO,
     SUCCESS,
+    Metric,
     column_in_sheet_unit,
     columns_in_units,
     format_length,
@@ -132,8 +135,9 @@ def compare_sides(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy and metric (those of ``METRICS``, the way home where missions may end in
-        the air, what is ``measured_columns``, then those of ``MEASURES``): ``policy``, the means
-        ``before`` and ``after``, and the columns of ``dess.analysis.compare``, with ``p_adjusted``
+        the air, the cost if there are prices, what is ``measured_columns``, then those of
+        ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
+        ``dess.analysis.compare``, with ``p_adjusted``
         (Holm) over the metrics of a policy. Every interval has its own level of 95 %; see
         ``stats.differences.compare_pairs``. Of what only one side measures, ``n`` is 0 and all else
         nan but the mean of this side.
@@ -142,6 +146,7 @@ def compare_sides(results: Results) -> pd.DataFrame:
     of_paper = with_way_home(results, METRICS)
     metrics = [
         *of_paper,
+        *(name for name in (COST,) if name in missions),
         *measured_columns(results),
         *(column_in_sheet_unit(name, missions) for name in MEASURES),
     ]
@@ -238,6 +243,8 @@ def format_change(answer: Any) -> str:
     It is in percentage points for the paper's metrics; small numbers have more digits.
     """
     ends = (answer.difference, answer.low, answer.high)
+    if metric_of(answer.metric).kind == "cost":
+        return numbers.format_amounts(*ends, sign="+")
     if not metric_of(answer.metric).in_percent:
         return _format_amount(*ends, sign="+")
     if 0 < answer.high - answer.low < 0.01:
@@ -299,6 +306,12 @@ class Variation:
         for row in self._of_product():
             facts += self._product_facts(row)
         table = self.table()
+        for row in table[table["metric"] == COST].itertuples():
+            unit = self.results.prices.unit
+            before, after = (numbers.format_money(mean, unit) for mean in (row.before, row.after))
+            change = f"{format_change(row)} {unit}, {_VERDICTS[judge_difference(row)]}"
+            label = f"{metric_of(COST).within} with {row.policy}"
+            facts.append(Fact(label, f"{change}; {before} before, {after} after"))
         for row in table[table["metric"] == HOME].itertuples():
             before, after = map(numbers.format_percent, (row.before, row.after))
             label = f"{metric_of(HOME).within} with {row.policy}"
@@ -386,13 +399,16 @@ class Variation:
         rows = table[table["policy"] == policy]
         lines = []
         for row in rows.itertuples():
-            in_percent = metric_of(row.metric).in_percent
-            if in_percent:
+            measure = self._measure_of(row.metric)
+            if measure.in_percent:
                 write, unit = (numbers.format_percent, " points")
+            elif measure.kind == "cost":
+                write, unit = (partial(numbers.format_money, currency=""), "")
             else:
                 write, unit = (_format_amount, "")
-            sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
-            name = (_SHORT | MEASURES).get(row.metric) or metric_of(row.metric).label
+            means = (row.before, row.after)
+            sides = ["–" if np.isnan(mean) else write(mean).rstrip() for mean in means]
+            name = (_SHORT | MEASURES).get(row.metric) or measure.label
             difference = ""
             if row.n:
                 difference = f"{MARKS[judge_difference(row)]} {format_change(row)}{unit}"
@@ -434,7 +450,7 @@ class Variation:
             metric: The metric.
         """
         table = self.table()
-        measure = metric_of(metric)
+        measure = self._measure_of(metric)
         unit = " points" if measure.in_percent else f" {measure.unit}".rstrip()
         parts = []
         for row in table[table["metric"] == metric].itertuples():
@@ -446,6 +462,13 @@ class Variation:
                 verdict = _VERDICTS[judge_difference(row)]
                 parts.append(f"with {row.policy} {verdict} ({format_change(row)}{unit})")
         return f"{measure.name} in the variation: {'; '.join(parts)}. "
+
+    def _measure_of(self, metric: str) -> Metric:
+        """A metric, in the currency of the study if it is a cost."""
+        measure = metric_of(metric)
+        if measure.kind == "cost":
+            return replace(measure, unit=self.results.prices.unit)
+        return measure
 
     def spread_in_words(self) -> str:
         """In how many missions the product differs with each policy, in a sentence."""

@@ -26,7 +26,7 @@ from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of
 from dess.analysis.ask import around
 from dess.analysis.ask.around import one_more_facts
 from dess.analysis.ask.assumptions import assumption_facts
-from dess.analysis.ask.falls import fall_facts
+from dess.analysis.ask.falls import fall_facts, setting_fall_facts
 from dess.analysis.ask.limits import limit_facts
 from dess.analysis.ask.question import Question, sweep_question, values_of, what_if_question
 from dess.analysis.execution.jobs import Progress
@@ -125,8 +125,9 @@ class SweepAnswer(Answer):
         return best_setting_headline(self.results, self._ranked(), self._ranking_metric)
 
     def own_facts(self) -> list[Fact]:
-        """The best setting, how the others compare, those of other policies, and the prices."""
+        """The best setting, how the others compare, where more collect less, and the prices."""
         facts = best_setting_facts(self.results, self._ranked(), self._ranking_metric)
+        facts += setting_fall_facts(self.results)
         if self.results.study.costs:
             facts += price_facts(self.results)
         return facts
@@ -302,8 +303,8 @@ class VariationAnswer(Answer):
         return self.variation.headline()
 
     def own_facts(self) -> list[Fact]:
-        """What the variation changes for every policy."""
-        return self.variation.facts()
+        """What the variation changes for every policy, and whether more collect less."""
+        return [*self.variation.facts(), *setting_fall_facts(self.results)]
 
     def table(self) -> pd.DataFrame:
         """The differences, a row per policy and metric, as ``answers.variation.compare_sides``."""
@@ -408,6 +409,7 @@ def what_if(
     folder: str | Path = "results",
     workers: int = 1,
     *,
+    prices: Mapping[str, Any] | None = None,
     shown: str | None = None,
     years: int | None = None,
     progress: Progress | None = None,
@@ -429,17 +431,26 @@ def what_if(
         seed: Seed of the missions.
         folder: Folder in which results are stored.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
-        years: Years of weather, in place of missions; 10 by default where a scenario has weather.
+        prices: Prices, as for ``sweep``: then costs are compared as well.
         shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
+        years: Years of weather, in place of missions; 10 by default where a scenario has weather.
         progress: Called with the number of missions done since its last call.
         yes: Whether the question may take more than an hour.
 
     Raises:
-        InputError: Before anything is written, if a field, a value or a policy is unknown or not
-            allowed, a policy cannot act in the scenario, or the question would take long.
+        InputError: Before anything is written, if a field, a value, a policy or a price is unknown
+            or not allowed, a policy cannot act in the scenario, or the question would take long.
     """
     question = what_if_question(
-        settings, baseline, scenario, policies, missions, seed, folder, years
+        settings,
+        baseline,
+        scenario,
+        policies,
+        missions,
+        seed,
+        folder,
+        prices=prices,
+        years=years,
     )
     check_shown(question, shown)
     return VariationAnswer(_ask(question, workers, progress, yes), question, shown)

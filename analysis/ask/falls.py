@@ -1,26 +1,40 @@
-"""Why one more UAV or pad of the cheapest fleet collects less, from event logs of few missions.
+"""Where one more UAV or pad collects less, and why: the policy's doing, not the fleet's.
 
 fall_facts(results)  # results of a search, of which ``around.question_around`` was asked
 draw_falls(results)
+setting_fall_facts(results)  # of settings that differ in UAVs or pads
+
+Of a search, event logs of few missions say what the UAVs do instead.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
+from dess.analysis.answers.settings.points import values_of_points
 from dess.analysis.ask import around
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.figures import Drawing
 from dess.analysis.flights.phases import ACTIVITIES, share_of_activities
 from dess.analysis.metrics import NODE_RATIOS, RATIO, metric_of
+from dess.analysis.names import field_named
 from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
-from dess.analysis.stats.differences import compare, differences_of, t_test
+from dess.analysis.stats.differences import (
+    Paired,
+    add_adjusted,
+    compare,
+    compare_pairs,
+    differences_of,
+    t_test,
+)
 from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.rows import group_rows
 from dess.analysis.stats.verdict import (
     BELOW,
     INCONCLUSIVE,
@@ -28,26 +42,76 @@ from dess.analysis.stats.verdict import (
     SEEN_WORSE,
     WORSE,
     better_or_worse,
+    judge_by_tests,
     judge_difference,
     position_of,
 )
+from dess.analysis.stats.weights import by_replication
 from dess.scenario.data_sheet import Units
+from dess.scenario.fields import ZONE_PADS, is_number
 from dess.scenario.quantities import printed
 
 MISSIONS = 10  # of the fleet, and of each neighbour that collects less
+LITTLE = 0.005  # a fall of the collection ratio in a sweep that is not worth a word
 NAMED = 3  # the largest number of activities that a fact names
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fall:
-    """A neighbour of the cheapest fleet that collects less than the fleet.
+    """A fleet that collects less than one that has fewer UAVs or pads.
 
     Attributes:
-        fleet: What is one more, as ``3 UAVs``.
-        before: The same of the fleet, as ``2 UAVs``.
+        fleet: What is more, as ``3 UAVs``.
+        before: The same of the other fleet, as ``2 UAVs``.
         policy: Who flies.
         difference: The paired difference of the collection ratio, as ``compare`` returns it.
         is_certain: Whether a rare failure is ruled out as its cause.
+        others: Of how many further settings the same is true.
+    """
+
+    fleet: str
+    before: str
+    policy: str
+    difference: pd.Series
+    is_certain: bool
+    others: int = 0
+
+    @property
+    def where(self) -> str:
+        """The two fleets in words."""
+        return f"{self.fleet} instead of {self.before}"
+
+    def facts(self) -> list[Fact]:
+        """How much less is collected, what the UAVs do instead if it is known, and the cause."""
+        metric = metric_of(RATIO)
+        change = metric.change(*self.difference[["difference", "low", "high"]])
+        text = f"{metric.within} {change} points"
+        if not self.is_certain:
+            text += f" in what was seen ({NOT_RULED_OUT})"
+        if self.others:
+            text += f"; less with more also in {numbers.format_count(self.others, 'other pair')}"
+        cause = (
+            f"{self.policy} and its return guard, not the fleet, which could leave unused what is "
+            "added"
+        )
+        return known_facts(
+            [
+                Fact(f"{self.where}, with {self.policy}", text),
+                *self._done_instead(),
+                Fact(f"{self.where}: cause", cause),
+            ]
+        )
+
+    def _done_instead(self) -> list[Fact]:
+        """What the UAVs do instead; nothing without event logs."""
+        return []
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoggedFall(Fall):
+    """A neighbour of the cheapest fleet that collects less than the fleet, with event logs.
+
+    Attributes:
         shares: (MISSIONS, activities) the shares of time.
         shares_before: The same of the fleet, in the same missions.
         last_data: (MISSIONS,) when the last data are collected [slots].
@@ -59,11 +123,6 @@ class Fall:
         units: What a slot is, of missions with a data sheet.
     """
 
-    fleet: str
-    before: str
-    policy: str
-    difference: pd.Series
-    is_certain: bool
     shares: pd.DataFrame
     shares_before: pd.DataFrame
     last_data: np.ndarray
@@ -73,27 +132,13 @@ class Fall:
     titles: list[str]
     units: Units | None
 
-    def facts(self) -> list[Fact]:
-        """How much less is collected, what the UAVs do instead, which node loses most, and why."""
-        metric = metric_of(RATIO)
-        change = metric.change(*self.difference[["difference", "low", "high"]])
-        doubt = ""
-        if not self.is_certain:
-            doubt = f" in what was seen ({NOT_RULED_OUT})"
-        where = f"{self.fleet} instead of {self.before}"
-        return known_facts(
-            [
-                Fact(f"{where}, with {self.policy}", f"{metric.within} {change} points{doubt}"),
-                Fact(f"{where}: time of a UAV", ", ".join(self._changes_of_time())),
-                Fact(f"{where}: last data", self._last_data()),
-                Fact(f"{where}: node that loses most", self._worst_node()),
-                Fact(
-                    f"{where}: cause",
-                    f"{self.policy} and its return guard, not the fleet, which could leave unused "
-                    "what is added",
-                ),
-            ]
-        )
+    def _done_instead(self) -> list[Fact]:
+        """What the UAVs do with their time, when they collect last, which node loses most."""
+        return [
+            Fact(f"{self.where}: time of a UAV", ", ".join(self._changes_of_time())),
+            Fact(f"{self.where}: last data", self._last_data()),
+            Fact(f"{self.where}: node that loses most", self._worst_node()),
+        ]
 
     def _last_data(self) -> str:
         """When the last data of a mission are collected, if earlier than before.
@@ -143,7 +188,7 @@ class Fall:
         return [text for _, text in changes[:NAMED]]
 
 
-def find_falls(results: Results) -> list[Fall]:
+def find_falls(results: Results) -> list[LoggedFall]:
     """The neighbours that collect significantly less than the cheapest fleet.
 
     Args:
@@ -152,13 +197,13 @@ def find_falls(results: Results) -> list[Fall]:
     Raises:
         InputError: If a mission simulated again differs from the stored one.
     """
-    if not around.is_known(results):
+    if not around.is_known(results) or results.study.years:  # years have no event logs
         return []
     return _compare_neighbours(results)
 
 
 @compute_once  # since the facts and the figure of a page need the same missions
-def _compare_neighbours(results: Results) -> list[Fall]:
+def _compare_neighbours(results: Results) -> list[LoggedFall]:
     changed_results = around.load_around(results)
     space = changed_results.scenario(0)
     differences = compare(changed_results.missions, 0, [RATIO], correction=None, of="point")
@@ -171,7 +216,7 @@ def _compare_neighbours(results: Results) -> list[Fall]:
         shares, last_data = _measure_times(changed_results, point)
         shares_before, last_data_before = _measure_times(changed_results, 0)
         falls.append(
-            Fall(
+            LoggedFall(
                 fleet=around.change_in_words(space, change),
                 before=around.change_in_words(space, _change_back(change)),
                 policy=changed_results.policies[0],
@@ -193,6 +238,93 @@ def _compare_neighbours(results: Results) -> list[Fall]:
 def fall_facts(results: Results) -> list[Fact]:
     """The facts of each neighbour that collects less; none if there is no such neighbour."""
     return [fact for fall in find_falls(results) for fact in fall.facts()]
+
+
+def setting_fall_facts(results: Results) -> list[Fact]:
+    """The facts of the largest falls of each policy; none if nothing falls."""
+    return [fact for fall in find_setting_falls(results) for fact in fall.facts()]
+
+
+@compute_once
+def find_setting_falls(results: Results) -> list[Fall]:
+    """Where settings collect significantly less than those with the next fewer UAVs or pads.
+
+    The p-values are corrected for all these pairs of settings. Where missions have a quota, a UAV
+    that is added cannot stay unused, so that nothing is said.
+
+    Args:
+        results: A study whose numbers of missions do not depend on their results.
+
+    Returns:
+        For each policy, and of UAVs, pads and the pads of further zones, the pair with the largest
+        fall.
+    """
+    spaces = results.store.manifest.scenarios
+    if results.study.selection or any(space.quota for space in spaces):
+        return []
+    pairs = _pairs_with_more(results)
+    missions = results.missions
+    rows = []
+    for policy, of_policy in missions.groupby("policy", sort=False):
+        wide = by_replication(of_policy, RATIO, "point")
+        for field, fewer, more in pairs:
+            values = wide.reindex(columns=[more, fewer]).dropna().to_numpy(float)
+            if len(values) > 1:
+                change = compare_pairs(values[:, 0], values[:, 1], metric=RATIO)
+                rows.append((policy, field, fewer, more, *change))
+    columns = ["policy", "field", "fewer", "more", *Paired._fields]
+    table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    if table.empty:
+        return []
+    table["verdict"] = [better_or_worse(verdict, RATIO) for verdict in judge_by_tests(table)]
+    worse = table[table["verdict"].isin([WORSE, SEEN_WORSE]) & (table["difference"] < -LITTLE)]
+    falls = []
+    for (policy, _), of_field in worse.groupby(["policy", "field"], sort=False):
+        row = of_field.loc[of_field["difference"].idxmin()]
+        fleet, before = _settings_in_words(results, row)
+        falls.append(
+            Fall(
+                fleet=fleet,
+                before=before,
+                policy=str(policy),
+                difference=row,
+                is_certain=row["verdict"] == WORSE,
+                others=len(of_field) - 1,
+            )
+        )
+    return falls
+
+
+def _pairs_with_more(results: Results) -> list[tuple[str, int, int]]:
+    """The field, and the design points with fewer and with the next more, all else the same."""
+    table = values_of_points(results)
+    pairs = []
+    for field in ("uavs", "pads", ZONE_PADS):
+        if field not in table or not table[field].map(is_number).all():
+            continue
+        for _, rows in group_rows(table, [other for other in table if other != field]):
+            points = rows.sort_values(field, kind="stable").index
+            pairs += [(field, *pair) for pair in pairwise(points)]
+    return pairs
+
+
+def _settings_in_words(results: Results, row: pd.Series) -> tuple[str, str]:
+    """The two settings of a pair: with more, and with fewer and what both have beside it."""
+    field = row["field"]
+    values = values_of_points(results).to_dict("records")
+    space = results.scenario(row["more"])
+    more, fewer = (
+        around.change_in_words(space, {field: values[row[point]][field]})
+        for point in ("more", "fewer")
+    )
+    both = [
+        field_named(str(name)).words(value)
+        for name, value in values[row["more"]].items()
+        if name != field
+    ]
+    if both:
+        fewer += f" ({', '.join(both)})"
+    return more, fewer
 
 
 def draw_falls(results: Results) -> list[Drawing]:

@@ -233,8 +233,7 @@ def sweep_question(
     Raises:
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
     """
-    if unknown := [key for key in prices or () if key not in Costs.model_fields]:
-        raise unknown_name("prices", f"{unknown[0]!r} is unknown", unknown[0], Costs.model_fields)
+    _check_prices(prices)
     space = load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     replications = replications_of(space, missions, years, MISSIONS)
     asked = replications.get("missions", MISSIONS)
@@ -272,6 +271,12 @@ def sweep_question(
         name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_question_key(study)}"
         study = study.model_copy(update={"name": name})
     return Question(study, Path(folder) / SWEEPS / name)
+
+
+def _check_prices(prices: Mapping[str, Any] | None) -> None:
+    """Refuse a price that there is none of."""
+    if unknown := [key for key in prices or () if key not in Costs.model_fields]:
+        raise unknown_name("prices", f"{unknown[0]!r} is unknown", unknown[0], Costs.model_fields)
 
 
 def _validated_study(
@@ -340,6 +345,8 @@ def what_if_question(
     missions: int | None = None,
     seed: int = 0,
     folder: str | Path = "results",
+    *,
+    prices: Mapping[str, Any] | None = None,
     years: int | None = None,
 ) -> Question:
     """What if the baseline had these settings? The arguments are those of ``analysis.what_if``.
@@ -348,9 +355,10 @@ def what_if_question(
     in ``FOLDER/what-if/HASH``.
 
     Raises:
-        InputError: If a field, a value or a policy is unknown or not allowed, or if ``settings``
-            changes nothing.
+        InputError: If a field, a value, a policy or a price is unknown or not allowed, or if
+            ``settings`` changes nothing.
     """
+    _check_prices(prices)
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
             raise InputError(name, repr(values), "fields and values, such as {uavs=5}")
@@ -376,6 +384,8 @@ def what_if_question(
         **replications,
         "seed": seed,
     }
+    if prices:
+        data["costs"] = dict(prices)
     asked = replications.get("missions", 1)
     study = _validated_study(data, "question", policies, asked)
     return Question(study, Path(folder) / WHAT_IF / _question_key(study))

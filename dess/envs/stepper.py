@@ -28,6 +28,7 @@ from dess.model.state import (
 )
 from dess.model.ways import Ways
 from dess.scenario.scenario import AnyScenario
+from dess.scenario.weather import refuse_weather
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "age")
@@ -66,6 +67,7 @@ class MissionStepper:
     def __init__(self, scenario: AnyScenario, num_envs: int, seed: int | None):
         self.space = spaces_of([scenario])[0]
         check_slotted([self.space])
+        refuse_weather([self.space.weather])
         self.indices = np.arange(num_envs)
         self.world = world_of(self.space)
         self.state = state_of([self.space], num_envs)

@@ -1,4 +1,4 @@
-"""A year at sea: the windows of weather that a fleet flies, and what it carries from one to the next.
+"""A year at sea: the windows of weather of a fleet, and what it carries from one to the next.
 
     campaign = Campaign(space, seed, replication)
     while campaign.begin_window(starts, b) >= 0:   # writes what mission b starts from

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -92,7 +92,7 @@ def sweep(
         policies,
         options.given(context, "missions"),
         seed,
-        options.parse_all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        _prices_of(price),
         options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         folder=results,
@@ -132,6 +132,7 @@ def what_if(
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
+    price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     shown: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
     results: Annotated[Path, typer.Option(metavar="DIR")] = options.RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR")] = options.PAGES,
@@ -149,6 +150,7 @@ def what_if(
         policy: A policy, or several that the UAVs follow in turn, compared with itself;
             repeatable.  [default: the best that five minutes allow, and greedy]
         missions: Missions of every policy on each side.
+        price: A price, as for dess sweep; then the costs of both sides are compared. Repeatable.
         shown: The policy whose missions are drawn.  [default: the best one in the variation]
         results: Folder in which the results are stored, as what-if/HASH.
         out: Folder of the page.
@@ -159,8 +161,17 @@ def what_if(
 
     changes = options.parse_all_settings(settings, options.SET)
     fixed = options.parse_all_settings(baseline or [], "--baseline")
+    prices = _prices_of(price)
     question = what_if_question(
-        changes, fixed, scenario, policy, options.given(context, "missions"), seed, results, years
+        changes,
+        fixed,
+        scenario,
+        policy,
+        options.given(context, "missions"),
+        seed,
+        results,
+        prices=prices,
+        years=years,
     )
     check_shown(question, shown)
     asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
@@ -173,6 +184,7 @@ def what_if(
         "missions": None if question.study.years else missions,
         "years": question.study.years,
         "seed": seed,
+        "prices": prices or None,
         "shown": shown,
     }
 
@@ -260,6 +272,11 @@ def _print_answer(
         print(json.dumps({**about, **told, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")
+
+
+def _prices_of(options_given: list[str] | None) -> dict[str, Any]:
+    """The prices that a command names."""
+    return options.parse_all_settings(map(_with_quotes, options_given or []), "--price", PRICE)
 
 
 def _with_quotes(text: str) -> str:

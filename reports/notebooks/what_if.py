@@ -23,6 +23,7 @@ policies = ["planner-short", "greedy"]  # None: the best that five minutes allow
 missions = 300  # number of missions of every policy, in the baseline and in the variation
 seed = 0  # seed of the missions
 workers = 1  # processes; more than one is worth its start time from thousands of missions on
+prices = None  # such as {"uav": 20_000}: then costs are compared as well
 yes = False  # True if the missions may take more than an hour
 shown = None  # the policy whose missions are drawn; None for the best in the variation
 
@@ -41,9 +42,8 @@ from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.tables import make_table
 
 # %%
-asked = what_if(
-    settings, baseline, scenario, policies, missions, seed, results, workers, shown=shown, yes=yes
-)
+question = settings, baseline, scenario, policies, missions, seed, results, workers
+asked = what_if(*question, prices=prices, shown=shown, yes=yes)
 found = asked.results
 variation = asked.variation
 
@@ -60,7 +60,8 @@ make_facts(asked.facts())
 
 # %%
 sides = found.scenario(0), found.scenario(1)
-make_panel(*sides, scenario, found.policies, seed, given=found.given_values(0))
+given, costs = found.given_values(0), found.study.costs
+make_panel(*sides, scenario, found.policies, seed, given=given, costs=costs)
 
 # %% [markdown]
 # ## Why

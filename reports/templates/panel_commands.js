@@ -51,16 +51,18 @@ const simulateCommand = (about, choice, replication) => commandLine("simulate", 
 });
 
 /**
- * The study of two choices: both settings with both policies. A sweep takes prices, too.
+ * The study of two choices: both settings with both policies, and the prices.
  * @type {(about: Named, a: Choice, b: Choice, price: string[], missions: number) => string}
  */
 function studyCommand(about, a, b, price, missions) {
-    const policy = [...new Set([a.policy, b.policy])].join(",");
-    const common = {policy, scenario: about.scenario, seed: about.seed, missions: Math.max(missions, 2)};
+    const policies = [...new Set([a.policy, b.policy])];
+    const common = {scenario: about.scenario, seed: about.seed, missions: Math.max(missions, 2), price};
     const changes = about.settings.flatMap(({options}, n) =>
         a.positions[n] === b.positions[n] ? [] : [options[b.positions[n]]]);
-    if (!changes.length) return commandLine("sweep", {set: valuesOf(about, a), ...common, price});
-    return commandLine("what-if", {baseline: valuesOf(about, a), set: changes, ...common});
+    const policy = policies.join(",");
+    if (!changes.length) return commandLine("sweep", {set: valuesOf(about, a), policy, ...common});
+    // To what-if, names joined by commas are a team.
+    return commandLine("what-if", {baseline: valuesOf(about, a), set: changes, policy: policies, ...common});
 }
 
 /**

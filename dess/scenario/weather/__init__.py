@@ -10,6 +10,7 @@ series takes the place of the wind, the horizon and the idle time of the data sh
 """
 
 import re
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -189,6 +190,17 @@ class Weather(Section):
             problem = f"has other content than the scenario's: SHA-256 {series.digest[:12]}..."
             raise InputError(self.path, problem, f"the file with {self.digest[:12]}...")
         return series
+
+
+def refuse_weather(weathers: Iterable[Weather]) -> None:
+    """Refuse weather where single missions are simulated.
+
+    Raises:
+        InputError: If one of these sections is on.
+    """
+    if any(weather.is_on for weather in weathers):
+        problem = "makes a replication a year, which evaluate, sweep, what-if and study simulate"
+        raise InputError("weather", problem, "a scenario without it")
 
 
 def is_shipped(file: str) -> bool:

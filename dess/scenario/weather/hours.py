@@ -83,8 +83,8 @@ class Hours:
 
     @property
     def names(self) -> dict[int, str]:
-        """What closes an hour in words, by its state."""
-        of_limits = {State.LIMIT + n: name for n, name in enumerate(self.limits)}
+        """What closes an hour in a word, by its state, such as limits.waves for a limit."""
+        of_limits = {State.LIMIT + n: f"limits.{name}" for n, name in enumerate(self.limits)}
         states = (State.NIGHT, State.MISSING, State.WIND)
         return {int(state): state.name.lower() for state in states} | of_limits
 
@@ -201,7 +201,7 @@ def _can_fly(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarra
     """
     speed = flight.cruise / min(flight.slots_per_cell)
     airspeeds = airspeeds_of(speed, wind, origin)
-    return (airspeeds <= flight.max_speed * (1 + _ROUNDING)).all(1)
+    return np.asarray((airspeeds <= flight.max_speed * (1 + _ROUNDING)).all(1))
 
 
 def _costs_of(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarray:
@@ -212,9 +212,7 @@ def _costs_of(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarr
         shares = flight.wing.power(airspeeds_of(speed, wind, origin)) / flight.wing.power(speed)
         of_slots = np.maximum(np.ceil(flight.of_cruising * shares - 1e-6), 1)
         if slots in flight.slots_per_cell and len(wind) and of_slots.max() > MOST_COST:
-            problem = (
-                f"a slot takes {of_slots.max() / PERCENT:.1f} % in an hour in which UAVs can fly"
-            )
+            problem = f"an open hour takes {of_slots.max() / PERCENT:.1f} % a slot"
             raise InputError("data_sheet.max_speed", problem, f"{MOST_COST // PERCENT} % at most")
         costs[:, slots - 1] = np.minimum(of_slots, np.iinfo(np.int16).max)
     return costs

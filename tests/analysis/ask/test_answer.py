@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from dess import InputError
-from dess.analysis import numbers, sweep
+from dess.analysis import numbers, sweep, what_if
 from dess.analysis.answers import variation as found
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.variation import BASELINE, VARIATION
@@ -337,3 +337,22 @@ def test_captions_say_what_the_figures_show(answer):
         assert f"higher in {share} and lower in" in variation.spread_in_words()
     never = answer.table().query("low == high == 0").iloc[0]
     assert f"with {never['policy']} the same in all pairs" in variation.finding(never["metric"])
+
+
+def test_costs_are_compared_where_there_are_prices(tmp_path):
+    """Two more UAVs cost their price more in every mission, and the command repeats the prices."""
+    prices = {"uav": 500, "charge": 40, "missions": 1}
+    sides, scenario = ({"uavs": 3}, {"uavs": 1}), write_scenario(tmp_path)
+    answer = what_if(*sides, scenario, ["greedy"], 6, 3, tmp_path, prices=prices)
+    row = answer.table().set_index("metric").loc["cost"]
+    assert row["difference"] == pytest.approx(row["after"] - row["before"]) and row["low"] >= 0
+    costs = answer.results.missions.groupby("point")["cost"].mean()
+    assert costs[BASELINE] >= 500
+    assert row["difference"] == pytest.approx(costs[VARIATION] - costs[BASELINE])
+    fact = found_of(answer.facts())["cost with greedy"]
+    assert fact.startswith("+1,") and " EUR, " in fact
+    assert "Cost [EUR]" in answer.variation.measures_table("greedy").cells["greedy"].tolist()
+    assert answer.question is not None
+    assert "--price uav=500.0 --price charge=40.0" in answer.question.command
+    with pytest.raises(InputError, match="^prices: 'uva' is unknown"):
+        what_if({"uavs": 3}, prices={"uva": 1})

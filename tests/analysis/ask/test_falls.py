@@ -1,12 +1,14 @@
 """Where one more UAV collects less, an answer says what the UAVs do with their time."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis import load_results, numbers
+from dess.analysis import load_results, numbers, sweep, what_if
+from dess.analysis.answers.settings.points import values_of_points
 from dess.analysis.ask import around, falls
 from dess.analysis.ask.question import sweep_question
 from dess.analysis.flights.phases import (
@@ -18,6 +20,7 @@ from dess.analysis.flights.phases import (
     WAITS,
     share_of_activities,
 )
+from dess.analysis.names import field_named
 from dess.analysis.results.resimulate import resimulate
 from dess.model.events import EventLog
 from dess.reports.pages.study import make_study_report
@@ -166,3 +169,54 @@ def test_nothing_is_said_where_no_neighbour_collects_less(searched, monkeypatch)
     again = load_results(searched.store.folder)
     assert falls.fall_facts(again) == []
     assert falls.draw_falls(again) == []
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """The busy sea with one UAV to three, which ``greedy`` flies worse the more there are."""
+    folder = tmp_path_factory.mktemp("swept")
+    values = {"uavs": [1, 2, 3], "data_sheet.data_rate": ["9 MB/h", "12 MB/h"]}
+    scenario = write_scenario(folder, **BUSY)
+    return sweep(scenario, ["greedy"], 30, folder=folder, **values)
+
+
+def test_a_sweep_says_where_more_uavs_collect_less(swept):
+    """Of the pairs of next fleets the largest fall, of whose cause a search says the same."""
+    missions = swept.results.missions
+    ratios = missions.groupby("point")["collection_ratio"].mean()
+    table = values_of_points(swept.results)
+    worst = min(
+        (ratios[more] - ratios[fewer], fewer, more)
+        for fewer, more in permutations(table.index, 2)
+        if table["data_sheet.data_rate"][fewer] == table["data_sheet.data_rate"][more]
+        and table["uavs"][more] == table["uavs"][fewer] + 1
+    )
+    assert worst[0] < -falls.LITTLE
+    (fall,) = falls.find_setting_falls(swept.results)
+    assert fall.difference[["difference", "fewer", "more"]].tolist() == pytest.approx([*worst])
+    uavs, rate = table.loc[worst[2], ["uavs", "data_sheet.data_rate"]]
+    assert fall.fleet == f"{uavs} UAVs"
+    found = found_of(swept.facts())
+    assert fall.before.endswith(f"({field_named('data_sheet.data_rate').words(rate)})")
+    assert found[f"{fall.where}, with greedy"].startswith("collection ratio −")
+    assert "not the fleet" in found[f"{fall.where}: cause"]
+
+
+def test_a_sweep_says_nothing_of_a_fall_that_chance_explains(swept):
+    missions = swept.results.missions
+    noise = np.random.default_rng(2).normal(0.5, 0.1, len(missions))
+    alike = replace(swept.results, missions=missions.assign(collection_ratio=noise))
+    assert falls.setting_fall_facts(alike) == []
+    little = 0.5 - 0.002 * missions["point"]
+    small = replace(swept.results, missions=missions.assign(collection_ratio=little))
+    assert falls.setting_fall_facts(small) == []
+
+
+def test_a_variation_with_one_more_uav_that_collects_less_says_so(swept, tmp_path):
+    scenario = write_scenario(tmp_path, **BUSY)
+    falling = falls.find_setting_falls(swept.results)[0]
+    more = int(falling.fleet.split()[0])
+    asked = {"uavs": more}, {"uavs": more - 1}, scenario, ["greedy"], 30
+    found = found_of(what_if(*asked, folder=tmp_path).facts())
+    where = f"{falling.fleet} instead of {falling.before.split(' (')[0]}"
+    assert "not the fleet" in found[f"{where}: cause"]

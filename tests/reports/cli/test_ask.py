@@ -106,7 +106,7 @@ def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_pa
     assert dess(*shlex.split(question.command)[1:])[0] == 0
     assert files_of(tmp_path / "results") == before
     asked = {"settings": {"uavs": 2}, "baseline": {"uavs": 1}, "policies": ["greedy", "random"]}
-    asked |= {"scenario": "small.toml", "missions": 6, "seed": 0, "shown": None}
+    asked |= {"scenario": "small.toml", "missions": 6, "seed": 0, "prices": None, "shown": None}
     assert [page[-1] for page in unrendered] == [asked] * 3
 
 

@@ -366,7 +366,8 @@ def test_the_page_simulates_what_python_does(visit, document):
     command = opened.page.locator("[data-panel=command]").text_content()
     assert command == (
         "dess what-if --baseline uavs=1 --set uavs=2 --policy greedy --scenario paper "
-        f"--seed {SEED} --missions {MISSIONS}"
+        f"--seed {SEED} --missions {MISSIONS} --price uav=1000 --price pad=300 --price charge=40 "
+        "--price hour=0 --price missions=1 --price currency=EUR"
     )
     assert opened.complaints == []
     assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
@@ -501,6 +502,10 @@ def test_prices_are_changed(visit, document):
         records = simulate_batch(space, policies.load("greedy"), SEED, MISSIONS)
         charging = 40 * records.uavs["charged"].sum(axis=1).mean() / 100
         assert cell.startswith(f"{2500 * uavs + 300 * 16 + charging:,.0f} EUR [")
+    tab.locator("[name=b-policy]").select_option("tour")
+    what_if = str(tab.locator("[data-panel=command]").text_content())
+    assert " --policy greedy --policy tour " in what_if and "--price uav=2500 " in what_if
+    tab.locator("[name=b-policy]").select_option("greedy")
     tab.locator("[name=a-uavs]").press("ArrowRight")
     sweep = str(tab.locator("[data-panel=command]").text_content())
     assert sweep.startswith("dess sweep --set uavs=2 ") and "--price uav=2500 " in sweep
