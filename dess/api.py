@@ -10,7 +10,7 @@ from typing import Any
 from dess.base.floors import check_floors
 from dess.model import batch, mission
 from dess.model.record import MissionRecord, Records
-from dess.scenario.scenario import AnyScenario, Constants, loaded
+from dess.scenario.scenario import AnyScenario, loaded
 from dess.scenario.weather import refuse_weather
 
 
@@ -85,8 +85,6 @@ def simulate_batch(
     """
     if isinstance(scenario, str) or not isinstance(scenario, Sequence):
         scenario = loaded(scenario)
-    spaces = [scenario] if isinstance(scenario, Constants) else scenario
-    refuse_weather(space.weather for space in spaces if isinstance(space, Constants))
     return batch.simulate_batch(
         scenario,
         load_policies(policy),

@@ -54,7 +54,6 @@ from dess.model.view import check_team
 from dess.physics.streams import MAX_REPLICATION
 from dess.policies.registry import Policy, load_team
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
-from dess.scenario.weather import refuse_weather
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
@@ -342,7 +341,6 @@ def _simulate_pieces(
     policies = asked.load_policies()
     pool = Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
-    refuse_weather([asked.scenario.weather])
     if asked.engine == "batch":
         simulate_batch(about[0].without_weather(), *about[1:], 1)  # compiles
     else:

@@ -61,8 +61,9 @@ OPERATIONS = np.dtype(
 )
 
 # The same of a year at sea (``dess.model.campaign``): ``success`` and ``home`` are the shares of
-# its windows that have it. Then the share of the data that is on land later than ``due``, the share of
-# the operating hours that was open, the number of windows, and the longest time without one [h].
+# its windows that have it. Then the share of the data that is on land later than ``due``, the
+# share of the operating hours that was open, the number of windows, and the longest time without
+# one [h].
 YEAR_RECORD = np.dtype(
     [
         (name, np.float64 if name in ("success", "home") else MISSION_RECORD[name])

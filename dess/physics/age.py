@@ -115,9 +115,7 @@ def write_age(mission, sensors, teeth, out):
         weights[row] = teeth[lengths[row]]
         ended += teeth[lengths[row]]
         peaks += highs[row] * weights[row]
-    for k in range(
-        mission.nodes
-    ):  # the last tooth of a node has no peak, and the first begins here
+    for k in range(mission.nodes):  # the last tooth of a node has no peak, the first begins here
         lows[len(lengths) + k] = starting_age(mission, mission.idle)
         highs[len(lengths) + k] = _length(mission, sensors[k], mission.slot) / m
     out.age, out.age_p99 = age_of_teeth(lows, highs, weights)

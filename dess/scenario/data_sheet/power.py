@@ -47,7 +47,7 @@ class Power(Quantities):
 
     @property
     def slot_of_cruising(self) -> Fraction:
-        """The battery that a slot of cruising takes in still air [%], as exactly as it was typed."""
+        """The battery that a slot of cruising takes in still air [%], exactly as typed."""
         if not self.cell:
             return Fraction(1)
         assert self.cruise
