@@ -115,10 +115,10 @@ class Costs(StrictTable):
         """
         if any(space.weather.is_on for space in spaces):
             if self.days is not None:
-                raise InputError("costs.days", "follows from the weather", "without this field")
+                raise InputError("costs: days", "follows from the weather", "without this field")
         elif self.years is not None and self.days is None:
             allowed = "with years, the missions of a year: 1..365"
-            raise InputError("costs.days", "is missing", allowed)
+            raise InputError("costs: days", "is missing", allowed)
         follows = any(space.units for space in spaces)
         where = "costs.slot_seconds"
         if follows and self.slot_seconds is not None:

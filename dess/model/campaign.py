@@ -13,6 +13,7 @@ milliseconds from the beginning of its year, those of a window are its mission s
 
 from collections.abc import Iterable
 from functools import lru_cache
+from math import fsum
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ class YearPlan(NamedTuple):
     @property
     def open_share(self) -> float:
         """The share of the operating hours that windows have."""
-        return sum(window.hours for window in self.windows) / max(self.operating, 1)
+        return fsum(window.hours for window in self.windows) / max(self.operating, 1)
 
     @property
     def longest_gap(self) -> int:
@@ -92,7 +93,7 @@ def plan_of(space: ScenarioSpace, year: Year) -> YearPlan:
         YearWindow(first - year.first, count, hours.costs[first : first + count].max(axis=0))
         for first, count in windows_of(hours, year, longest, space.units.slot)
     ]
-    operating = int((state != HourState.NIGHT).sum())
+    operating = int(np.count_nonzero(state != HourState.NIGHT))
     return YearPlan(year.year, year.hours, operating, windows)
 
 
@@ -210,8 +211,9 @@ class Campaign:
         for uav, is_grounded in zip(self.fleet, grounded, strict=True):
             uav.state["grounded"] = is_grounded
         self._charge(gap)
-        self.spares += sum(arrives <= begin for arrives in self.ordered)
-        self.ordered = [arrives for arrives in self.ordered if arrives > begin]
+        awaited = [arrives for arrives in self.ordered if arrives > begin]
+        self.spares += len(self.ordered) - len(awaited)
+        self.ordered = awaited
         self.flying = []
         for uav in self.fleet:
             if uav.arrives > begin and self.spares > 0:
@@ -266,8 +268,9 @@ class Campaign:
 
     def _working_pads(self) -> list[int]:
         """The working pads of each zone."""
-        out = np.split(self.mission[0].pads_out, np.cumsum(self.space.zone_pads))
-        return [n - int(o.sum()) for n, o in zip(self.space.zone_pads, out, strict=False)]
+        ends = np.cumsum(self.space.zone_pads)
+        by_zone = np.split(self.mission[0].pads_out, ends)[: len(ends)]
+        return [len(out) - int(np.count_nonzero(out)) for out in by_zone]
 
     def _write_start(
         self, starts: Starts, b: int, window: YearWindow, slots: int, begin: int
@@ -340,10 +343,10 @@ class Campaign:
         windows = max(totals.windows, 1)
         year["uavs"], year["slots"] = len(self.fleet), totals.slots  # hours are paid in windows
         year["success"], year["home"] = totals.success / windows, totals.home / windows
-        year["initial"], year["arrived"] = totals.initial.sum(), totals.arrived.sum()
-        year["collected"], year["residual"] = totals.lands, self.data.sum()
-        year["reward"] = totals.uavs["reward"].sum()
-        year["uav_slots"] = (totals.uavs["slots_flying"] + totals.uavs["slots_charging"]).sum()
+        year["initial"], year["arrived"] = fsum(totals.initial), fsum(totals.arrived)
+        year["collected"], year["residual"] = totals.lands, fsum(self.data)
+        year["reward"] = fsum(totals.uavs["reward"])
+        year["uav_slots"] = totals.slots_of_uavs("slots_flying", "slots_charging")
         data = year["initial"] + year["arrived"]
         year["collection_ratio"] = min(max(totals.lands / data, 0.0), 1.0) if data > 0 else 1.0
         year["collection_ratio_and_communication"] = year["collection_ratio"] * year["success"]
@@ -362,15 +365,15 @@ class Campaign:
 
     def _write_operations(self, out: np.void, slots: float) -> None:
         totals = self.totals
-        out["age"] = float(np.mean(totals.age_area)) / slots
-        out["late"] = float(self.rates @ totals.late / (self.rates.sum() * slots))
+        out["age"] = fsum(totals.age_area) / len(totals.age_area) / slots
+        out["late"] = fsum(self.rates * totals.late) / (fsum(self.rates) * slots)
         out["open"], out["longest_gap"] = self.plan.open_share, self.plan.longest_gap
         out["windows"] = totals.windows
-        waited = totals.uavs["slots_waiting"].sum()
+        waited = totals.slots_of_uavs("slots_waiting")
         if self.mission[0].has_charging:
             out["pad_requests"] = totals.pad_requests
             out["waiting"] = waited / totals.pad_requests if totals.pad_requests else np.nan
-            charged = totals.uavs["slots_charging"].sum()
+            charged = totals.slots_of_uavs("slots_charging")
             flown = max(totals.slots, 1)
             out["queue"] = waited / flown
             out["utilisation"] = charged / (self.space.charging_pads * flown)
@@ -407,6 +410,10 @@ class Totals:
         self.collected += record.nodes["collected"]
         self.age_area += record.nodes["age"] * record.slots
         self.late += late
+
+    def slots_of_uavs(self, *names: str) -> int:
+        """How many slots all UAVs together have spent with something."""
+        return int(np.add.reduce([np.add.reduce(self.uavs[name]) for name in names]))
 
     def count_uav(self, number: int, row: np.void) -> None:
         """Count what a UAV has done in a window."""

@@ -289,9 +289,11 @@ class MissionRecord:
     nodes: np.ndarray | None = None
 
     def __getattr__(self, name: str) -> Any:
-        for record in (self.metrics, self.operations):
-            if record is not None and name in (record.dtype.names or ()):
-                return record[name].item()
+        if name in (MISSION_RECORD.names or ()):
+            return self.metrics[name].item()
+        if name in (YEAR_OPERATIONS.names or ()) and self.operations is not None:
+            if name in (self.operations.dtype.names or ()):
+                return self.operations[name].item()
         raise AttributeError(name)
 
     def __repr__(self) -> str:

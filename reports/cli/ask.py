@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 PRICE = "a price and its amount, e.g. uav=20000"
 SHARE = "a metric and its least mean, e.g. success=0.99"
 
+WHAT_IF_QUESTION = "what-if question"
+
 app = typer.Typer()
 
 
@@ -182,7 +184,6 @@ def what_if(
         "scenario": scenario,
         "policies": [*map(str, question.study.policies)],
         "missions": None if question.study.years else missions,
-        "years": question.study.years,
         "seed": seed,
         "prices": prices or None,
         "shown": shown,
@@ -194,7 +195,7 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    _print_answer(question, answer, render, as_json, "what-if question")
+    _print_answer(question, answer, render, as_json, WHAT_IF_QUESTION)
 
 
 def _run_question(
@@ -252,7 +253,10 @@ def _print_answer(
             print_facts(assumed)
         console.print_text(f"study: {question.file}")
     page = None
-    if absent := missing("reports", f"the page of a {asked}"):
+    absent = missing("reports", f"the page of a {asked}")
+    if question.study.years and asked == WHAT_IF_QUESTION:
+        absent = "it draws single missions, and these are years"
+    if absent:
         console.print_text(f"no page: {absent}", sys.stderr)
     else:
         with rendering_bar() as progress:

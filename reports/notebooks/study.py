@@ -103,7 +103,7 @@ make_facts(answer.facts())
 # %% tags=["if-brief"]
 show_parts(page.draw_typical_mission(study))
 
-# %%
+# %% tags=["if-missions"]
 page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
@@ -292,7 +292,7 @@ show_parts(
 # %% tags=["if-sensitivity"]
 worst = summary.worst_missions(study, summary.best_policy(study.missions))
 
-# %%
+# %% tags=["if-missions"]
 show_parts(
     summary.worst_missions_table(study, worst),
     write_markdown("{commands}", commands=page.list_commands(study, worst)),
