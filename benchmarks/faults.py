@@ -1,17 +1,20 @@
 """Thirty faults planted by hand in the compiled rules, and which oracles of the tests catch them.
 
-``python benchmarks/faults.py`` copies the tree, plants one fault after the other in the copy, and
-runs the tests of each oracle; ``--fault NAME`` and ``--oracle NAME`` choose some of them. A fault
-compiles the rules anew, so all of them take hours on one core. ``benchmarks/mutants.py`` leaves
-compiled functions out.
+``python benchmarks/faults.py`` copies the tree, runs the tests of each oracle in the copy, which
+must pass, and then plants one fault after the other; ``--fault NAME`` and ``--oracle NAME`` choose
+some of them. ``benchmarks/faults.csv`` has the first test of each oracle that failed, as the last
+run of all left it. ``benchmarks/mutants.py`` leaves compiled functions out.
 """
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,10 +31,14 @@ class Fault(NamedTuple):
     old: str
     new: str
 
-    def plant(self, root: Path) -> None:
-        """Plant it in a copy of the tree."""
+    @contextmanager
+    def planted(self, root: Path) -> Iterator[None]:
+        """A copy of the tree has the fault meanwhile."""
         path = root / self.file
-        path.write_text(self.change(path.read_text("utf-8")), "utf-8")
+        source = path.read_text("utf-8")
+        path.write_text(self.change(source), "utf-8")
+        yield
+        path.write_text(source, "utf-8")
 
     def change(self, source: str) -> str:
         """The source of the file with the fault.
@@ -262,8 +269,10 @@ def copy_tree(folder: Path) -> Path:
     return folder
 
 
-def catches(oracle: str, root: Path) -> bool:
-    """Whether a test of an oracle fails in a copy of the tree.
+def failed_test(oracle: str, root: Path) -> str:
+    """The first test of an oracle that fails in a copy of the tree; empty if none does.
+
+    What a fault does not touch is compiled once for all faults, as they share one copy.
 
     Raises:
         RuntimeError: If its tests could not be run.
@@ -275,11 +284,18 @@ def catches(oracle: str, root: Path) -> bool:
     }
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-n0", "-p", "no:cacheprovider"]
     tests = subprocess.run(
-        [*command, *ORACLES[oracle]], cwd=root, env=environment, stdout=subprocess.DEVNULL
+        [*command, "--tb=no", *ORACLES[oracle]],
+        cwd=root,
+        env=environment,
+        capture_output=True,
+        text=True,
     )
-    if tests.returncode not in (0, 1):
+    if tests.returncode == 0:
+        return ""
+    failed = re.search(r"^(?:FAILED|ERROR) \S+?::(.*?)(?: - .*)?$", tests.stdout, re.MULTILINE)
+    if tests.returncode != 1 or failed is None:
         raise RuntimeError(f"{oracle}: pytest ended with exit code {tests.returncode}")
-    return tests.returncode == 1
+    return failed[1]
 
 
 def main() -> None:
@@ -289,16 +305,20 @@ def main() -> None:
     parser.add_argument("--oracle", action="append", choices=ORACLES)
     parser.add_argument("--out", type=Path, default=Path("faults.csv"))
     options = parser.parse_args()
-    chosen = options.fault or [""]
+    chosen, oracles = options.fault or [""], options.oracle or [*ORACLES]
     rows = []
-    for fault in (f for f in FAULTS if any(part in f.name for part in chosen)):
-        with tempfile.TemporaryDirectory() as folder:
-            root = copy_tree(Path(folder))
-            fault.plant(root)
-            caught = {name: catches(name, root) for name in options.oracle or ORACLES}
-        rows.append({"fault": fault.name, "file": fault.file, **caught})
-        pd.DataFrame(rows).to_csv(options.out, index=False)
-        print(fault.name, *(name for name, is_caught in caught.items() if is_caught), sep="; ")
+    with tempfile.TemporaryDirectory() as folder:
+        root = copy_tree(Path(folder))
+        for oracle in oracles:
+            if failed := failed_test(oracle, root):
+                raise RuntimeError(f"{oracle} fails without a fault: {failed}")
+        for fault in (f for f in FAULTS if any(part in f.name for part in chosen)):
+            with fault.planted(root):
+                failures = {oracle: failed_test(oracle, root) for oracle in oracles}
+            rows.append({"fault": fault.name, "file": fault.file} | failures)
+            pd.DataFrame(rows).to_csv(options.out, index=False)
+            caught = [oracle for oracle, failed in failures.items() if failed]
+            print(fault.name, ", ".join(caught) or "no oracle", sep=": ", flush=True)
 
 
 if __name__ == "__main__":

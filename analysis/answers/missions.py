@@ -1,26 +1,21 @@
 """Missions of a study: which one is typical, its cost in words, and the data of its nodes."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 
 from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.figures import Drawing
 from dess.analysis.metrics import PRODUCT, RATIO
-from dess.analysis.results import parquet
 from dess.analysis.results.event_log import Events
 from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.groups import summary
-from dess.base.files.reading import paths_in
 
-FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 NEGLECTED = 3  # how many nodes are named of which the least is collected
 
 
@@ -140,10 +135,9 @@ def typical_replication(missions: pd.DataFrame, metric: str) -> int:
 def keep_logs(
     results: Results,
     wanted: Sequence[tuple[str, int]],
-    folder: str | Path,
     progress: Callable[[int, int], None],
 ) -> None:
-    """Simulate missions again whose event logs are not in ``FOLDER``, and store the logs there.
+    """Simulate missions again whose event logs are not there, and keep the logs (``Derived``).
 
     If the new record of a mission differs from the stored one, because other code simulated it, no
     log is stored. Nor is one of a policy of a Python file, which may be anybody's code.
@@ -151,49 +145,36 @@ def keep_logs(
     Args:
         results: The study.
         wanted: Policies and replications of the missions, at the first design point.
-        folder: A folder that contains a results folder per study.
         progress: Called with the number of missions done and of all missions.
 
     Raises:
         InputError: If a log cannot be written.
     """
     for done, (policy, replication) in enumerate(wanted, 1):
-        if _kept_log(results, policy, replication, folder) is None:
-            _keep_log(results, policy, replication, folder)
+        if _kept_log(results, policy, replication) is None:
+            _keep_log(results, policy, replication)
         progress(done, len(wanted))
 
 
-def kept_missions(
-    results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
-) -> list[LoggedMission]:
+def kept_missions(results: Results, wanted: Sequence[tuple[str, int]]) -> list[LoggedMission]:
     """Those of the missions whose event logs ``keep_logs`` has stored."""
     return [
         LoggedMission.of(results, policy, 0, replication, log)
         for policy, replication in wanted
-        if (log := _kept_log(results, policy, replication, folder)) is not None
+        if (log := _kept_log(results, policy, replication)) is not None
     ]
 
 
-def _keep_log(results: Results, policy: str, replication: int, folder: str | Path) -> None:
+def _keep_log(results: Results, policy: str, replication: int) -> None:
     try:
         events = resimulate(results, policy, 0, replication).events
     except InputError:  # the record is another one, or the policy is a Python file
         return
-    # Arrow would read the nan of a pandas column as a missing value.
-    table = pa.table({name: events[name].to_numpy() for name in events}, schema=parquet.EVENTS)
-    parquet.write(Path(folder, FOLDER), _log_name(results, policy, replication), table)
+    results.store.derived.keep_log(results.cell(policy, 0), replication, events)
 
 
-def _kept_log(
-    results: Results, policy: str, replication: int, folder: str | Path
-) -> pd.DataFrame | None:
-    files = paths_in(Path(folder, FOLDER), f"{_log_name(results, policy, replication)}-*.parquet")
-    tables = (parquet.read(path) for path in files)
-    return next((table.to_pandas() for table in tables if table is not None), None)
-
-
-def _log_name(results: Results, policy: str, replication: int) -> str:
-    return f"{results.cell(policy, 0).key}-{replication:06}"
+def _kept_log(results: Results, policy: str, replication: int) -> pd.DataFrame | None:
+    return results.store.derived.load_log(results.cell(policy, 0), replication)
 
 
 def estimate_metric(

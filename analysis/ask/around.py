@@ -108,13 +108,8 @@ def list_changes(changed_results: Results) -> list[dict[str, Any]]:
 
 def _place_of_question(results: Results) -> Path:
     """The results folder of the question, beside that of the study."""
-    return place_beside(results, "one-more")
-
-
-def place_beside(results: Results, what: str) -> Path:
-    """Where something about the cheapest fleet of a study is kept, beside its results folder."""
     about = f"{results.store.manifest.key} {search_of(results).best.policy}"
-    name = f"{results.store.manifest.study.name[:LONGEST]}-{what}-{short_hash(about.encode())}"
+    name = f"{results.store.manifest.study.name[:LONGEST]}-one-more-{short_hash(about.encode())}"
     return results.store.folder.parent / name
 
 

@@ -12,7 +12,6 @@ with many, each weighed by how likely it is at that rate.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +22,6 @@ from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
-from dess.analysis.ask.around import place_beside
 from dess.analysis.facts import Fact
 from dess.analysis.metrics import NODES_BEHIND, columns_in_units, metric_of
 from dess.analysis.results.parquet import columns_of_nodes
@@ -34,7 +32,6 @@ from dess.analysis.stats.weights import values_within
 from dess.analysis.stats.worst_node import worst_node
 from dess.analysis.study.study import CHECK
 from dess.base.files.documents import Document
-from dess.base.files.writing import write_file
 from dess.model.events import Event
 from dess.model.record import Records
 from dess.policies.registry import is_path, load_team
@@ -54,6 +51,7 @@ _RAREST = 1e-8  # failures that never happen [1/h of flying]
 _MORE_FAILURES = 3  # times as many as those that are borne
 _MORE_MISSIONS = 3  # times as many for failures
 
+_DOCUMENT = "limits"  # in which they are kept
 # In the order in which conditions of equal hardness are told.
 _NAMES = {
     "data_sheet.data_rate": "data that it bears",
@@ -219,11 +217,6 @@ def _digits_of_limit(trials: Mapping[float, Trial], broken: str) -> int:
     return 1
 
 
-def place_of_limits(results: Results) -> Path:
-    """The file of the limits, beside the results folder of the study."""
-    return place_beside(results, "limits").with_suffix(".json")
-
-
 def find_limits(
     results: Results,
     scenario: str,
@@ -231,11 +224,11 @@ def find_limits(
     progress: Callable[[int], object] | None = None,
     missions: int = MISSIONS,
 ) -> None:
-    """Find the limits of the cheapest fleet, and keep them beside its results.
+    """Find the limits of the cheapest fleet, and keep them in its results folder (``Derived``).
 
     A fleet for several conditions is asked about under the last of them. Nothing happens without a
     data sheet or a check, or if no fleet is known to meet the requirements, its policy is a file,
-    or only the SimPy engine can simulate it; or if the limits are kept already.
+    or only the SimPy engine can simulate it; or if the limits are kept already, or nothing can be.
 
     Args:
         results: A study that searches for the cheapest setting.
@@ -245,8 +238,9 @@ def find_limits(
         missions: The most missions of the check that are simulated for every value.
     """
     best = search_of(results).best
-    path = place_of_limits(results)
-    if not best.points or is_path(best.policy) or results.checks.empty or path.exists():
+    if not best.points or is_path(best.policy) or results.checks.empty:
+        return
+    if results.store.is_read_only or results.store.derived.has(_DOCUMENT):
         return
     if results.store.manifest.processes:
         return
@@ -259,7 +253,7 @@ def find_limits(
         limits = tuple(sorted(_search_limits(fleet), key=_order_of))
     has_wind = fleet.space.data_sheet.max_speed is not None
     document = Limits(missions=fleet.missions, limits=limits, has_wind=has_wind, broken=broken)
-    write_file(path, document.model_dump_json(indent=1) + "\n")
+    results.store.derived.keep(_DOCUMENT, document)
 
 
 def _order_of(limit: Limit) -> tuple[bool, float]:
@@ -675,10 +669,10 @@ def limits_of(results: Results) -> Limits | None:
     Raises:
         InputError: If the file is damaged.
     """
-    path = place_of_limits(results)
-    if not path.exists():
+    derived = results.store.derived
+    if not derived.has(_DOCUMENT):
         return None
-    return Limits.load(path, "what dess sweep has written")
+    return derived.load(_DOCUMENT, Limits, "what dess sweep has written")
 
 
 def limit_facts(results: Results) -> list[Fact]:

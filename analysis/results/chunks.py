@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from dess import InputError
-from dess.analysis.results.manifest import ELSEWHERE, CellPart
+from dess.analysis.results.manifest import ELSEWHERE, Cell, CellPart
 from dess.base.files.reading import paths_in
 
 
@@ -69,6 +69,7 @@ MANIFEST, LOCK = "manifest.json", ".lock"
 LONG = 150  # largest number of characters of a policy's name in the name of a folder
 BOUNDS = "bounds"  # the folder of the bounds of missions, which are the same for all policies
 FOLDERS = ("missions", "uavs", "events", BOUNDS, "failures")
+DERIVED = "derived"  # the folder of what answers and pages have computed from the missions
 
 
 def partition_name(policy: str) -> str:
@@ -79,13 +80,19 @@ def partition_name(policy: str) -> str:
     return f"policy={name}"
 
 
+def log_name(cell: Cell, replication: int) -> str:
+    """The first part of the name of a file with the event log of a replication of a cell."""
+    return f"{cell.key}-{replication:06}"
+
+
 def check_places(folder: Path) -> None:
     """Refuse links in the places of a run's own files: it would write and delete where they lead.
 
     Raises:
         InputError: If there are links, or files and folders in each other's place.
     """
-    for path in (*(folder / name for name in FOLDERS), *paths_in(folder, "*/policy=*")):
+    ours = (folder / name for name in (*FOLDERS, DERIVED))
+    for path in (*ours, *paths_in(folder, "*/policy=*")):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(path, "is a link, or not what a run would write there", ELSEWHERE)
 

@@ -2,11 +2,12 @@
 
 ``manifest.json`` describes the study and what it was run with. ``missions/`` and ``uavs/`` contain
 the records in chunks, partitioned by policy; ``events/`` contains event logs, ``bounds/`` the upper
-bounds of missions, and ``failures/`` describes what could not be computed. The name of a file has
+bounds of missions, ``failures/`` describes what could not be computed, and ``derived/`` has what
+answers and pages have computed from the missions (``derived.py``). The name of a file has
 two hashes: of its content (cells and replications), and of its bytes. So a run can resume by
 computing what is missing, and a damaged file counts as missing. A file is written completely or not
 at all. Nothing is pickled. The content of the folder does not depend on when, where, in which order
-or by how many workers it was computed.
+or by how many workers it was computed, but for ``derived/``.
 """
 
 import json
@@ -38,6 +39,7 @@ from dess.analysis.metrics import (
     longest_wait,
 )
 from dess.analysis.results import chunks, parquet
+from dess.analysis.results.derived import Derived
 from dess.analysis.results.manifest import (
     ELSEWHERE,
     NO_TEAM,
@@ -309,6 +311,11 @@ class Store:
         self._present["events"][key].append(range(replication, replication + 1))
 
     @property
+    def derived(self) -> Derived:
+        """What answers and pages have computed from the missions that are there now."""
+        return Derived(self.folder, self.manifest.key)
+
+    @property
     def files(self) -> list[Path]:
         """The files of records, event logs and bounds, the damaged ones included."""
         folders = [*paths_in(self.folder, "*/policy=*"), self.folder / chunks.BOUNDS]
@@ -362,7 +369,7 @@ class Store:
     def keep_log(self, cell: Cell, replication: int, columns: dict[str, Any]) -> None:
         """Store the event log of a replication of a cell."""
         ((folder, _),) = self._places("events", cell.team)
-        path = parquet.write(folder, f"{cell.key}-{replication:06}", pa.table(columns))
+        path = parquet.write(folder, chunks.log_name(cell, replication), pa.table(columns))
         self._enter_log(cell.key, replication, path)
 
     def take_over(self, other: "Store", parts: Iterable[CellPart]) -> None:

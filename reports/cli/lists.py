@@ -89,6 +89,7 @@ def show_scenario(
     """
     from dess.analysis.names import declared_fields
     from dess.analysis.sheet import sheet_facts, sheet_lines, small_zone_sentences
+    from dess.analysis.weather import weather_facts, weather_lines
     from dess.scenario.consistency import distance_error, distance_sentence
     from dess.scenario.scenario import draft_scenario, scenario_description
 
@@ -108,6 +109,8 @@ def show_scenario(
         if space.units:
             shown["units"] = space.units._asdict()
             shown["follows"] = sheet_facts(space)
+        if space.weather.is_on:
+            shown["weather"] = weather_facts(space)
         if space.centre:
             shown["distance_error"] = distance_error(space)
         if notes:
@@ -119,6 +122,9 @@ def show_scenario(
     if space.units:
         console.print_text(str(space.units))
         for line in sheet_lines(space):
+            console.print_text(line)
+    if space.weather.is_on:
+        for line in weather_lines(space):
             console.print_text(line)
     if space.centre:
         console.print_text(distance_sentence(space))

@@ -77,10 +77,11 @@ def report(
     if yes:  # a parameter of the notebooks that simulate missions
         values["yes"] = True
     from dess.analysis.results.tables import load_results
-    from dess.reports.pages.notebook import NAMES
+    from dess.reports.pages.notebook import report_names
     from dess.reports.pages.render import render, render_study
 
-    folders = [n for n in names or [] if os.sep in n or (n not in NAMES and os.path.isdir(n))]
+    known = report_names()
+    folders = [n for n in names or [] if os.sep in n or (n not in known and os.path.isdir(n))]
     reports = [name for name in names or [] if name not in folders]
     with rendering_bar() as progress:
         if reports or not folders:

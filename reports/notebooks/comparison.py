@@ -59,7 +59,7 @@ from dess.reports.pages.tables import make_table
 
 # %%
 study = load_results(f"{results}/comparison")
-times = read_decision_times(results, study)
+times = read_decision_times(study)
 pair = pair_of(study, learned, heuristic)
 missions = pair_missions(study, pair)
 comparison = compare_pair(study, pair)
@@ -94,7 +94,7 @@ show_parts(
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-kept = logged.kept_missions(study, missions_to_draw(missions, pair), results)
+kept = logged.kept_missions(study, missions_to_draw(missions, pair))
 make_gallery(
     logged.draw_mission(
         mission, f"Map of mission {mission.replication} by {mission.policy}", mission.caption

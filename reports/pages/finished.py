@@ -15,7 +15,7 @@ import nbformat
 
 import dess
 from dess import InputError
-from dess.analysis.results.chunks import MANIFEST
+from dess.analysis.results.chunks import DERIVED, MANIFEST
 from dess.base.files.documents import LIMIT
 from dess.base.files.reading import hash_file, paths_in
 from dess.base.floors import FLOORS
@@ -44,9 +44,10 @@ def page_key(report: Report) -> str:
     """The key of a page whose notebook has its default parameters."""
     parts = [_hash_software(), nbformat.writes(report.original)]
     for name, folder in report.results.items():
-        # The names of these files have their hashes.
-        files = [path.relative_to(folder).as_posix() for path in paths_in(folder, "**/*.parquet")]
-        parts += [name, hash_file(folder / MANIFEST, LIMIT), *files]
+        # The names of these files have their hashes. Those of ``DERIVED`` follow from them.
+        files = [path.relative_to(folder) for path in paths_in(folder, "**/*.parquet")]
+        records = [path.as_posix() for path in files if path.parts[0] != DERIVED]
+        parts += [name, hash_file(folder / MANIFEST, LIMIT), *records]
     return sha256(repr(parts).encode()).hexdigest()
 
 

@@ -17,7 +17,7 @@ from dess import InputError
 from dess.analysis.wasm.module import MOST_BYTES, read_module
 from dess.base.files.reading import paths_in, read_bytes
 from dess.reports.pages import INDEX, PREFIX
-from dess.reports.pages.notebook import GROUPS, SCORECARD
+from dess.reports.pages.notebook import SCORECARD, find_groups
 from dess.reports.pages.page import Page
 from dess.reports.pages.templates import (
     EXAMPLE_SCRIPT,
@@ -82,23 +82,21 @@ def render_example() -> str:
     )
 
 
-def sort_pages(pages: Iterable[str], group: str | None = None) -> list[str]:
-    """File names of pages in the order of the index: those of a group, or all."""
-    present = {*pages}
-    studies = sorted(name for name in present if _OF_STUDY.fullmatch(name))
-    order = []
-    for heading, names in GROUPS.items():
-        if group in (None, heading):
-            if heading == next(iter(GROUPS)):
-                order += studies
-            order += [f"{name}.html" for name in names]
-    return [name for name in order if name in present]
+def sort_pages(pages: Iterable[str]) -> list[str]:
+    """File names of pages in the order of the index."""
+    return [name for _, of_group in group_pages(pages) for name in of_group]
 
 
 def group_pages(pages: Iterable[str]) -> list[tuple[str, list[str]]]:
     """The headings of the groups that have a page, each with the file names of its pages."""
-    names = {heading: sort_pages(pages, heading) for heading in GROUPS}
-    return [(heading, of_group) for heading, of_group in names.items() if of_group]
+    present = {*pages}
+    first = sorted(name for name in present if _OF_STUDY.fullmatch(name))
+    groups = []
+    for heading, names in find_groups().items():
+        of_group = [name for name in (f"{name}.html" for name in names) if name in present]
+        groups.append((heading, first + of_group))
+        first = []
+    return [(heading, of_group) for heading, of_group in groups if of_group]
 
 
 def add_bars(pages: Mapping[str, Page]) -> dict[str, Page]:

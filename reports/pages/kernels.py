@@ -174,6 +174,6 @@ def simulate_missing(
         study = load_results(results / COMPARISON)
         pair = pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
         drawn = missions_to_draw(pair_missions(study, pair), pair)
-        keep_logs(study, drawn, results, show)
+        keep_logs(study, drawn, show)
     for page in TIMED.keys() & {*pages}:
-        ensure_decision_times(results, load_results(results / TIMED[page]), show)
+        ensure_decision_times(load_results(results / TIMED[page]), show)

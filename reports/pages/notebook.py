@@ -2,7 +2,8 @@
 
 A notebook is a Python file in jupytext's percent format. Its heading and first paragraph are the
 title and the description of the page. Its metadata name the studies that it reads, and tell whether
-its page has scripts. One of its cells is tagged ``parameters``:
+its page has scripts. One of its cells is tagged ``parameters``. Other packages may have further
+ones (``outside.py``).
 
     >>> report = read_report("what-if")
     >>> report.set_parameters({"missions": 500})
@@ -25,6 +26,7 @@ from dess.analysis.results.chunks import MANIFEST
 from dess.base.errors import InputError, shown, unknown_name
 from dess.base.files.reading import paths_in, read_text
 from dess.policies.registry import is_path
+from dess.reports.pages.outside import find_outside_notebooks
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
 SCORECARD = "scorecard"
@@ -35,6 +37,7 @@ GROUPS = {
     "The paper": ("performance", SCORECARD, "parameters"),
 }
 NAMES = tuple(name for names in GROUPS.values() for name in names)
+OTHERS = "Other pages"  # the group of a notebook of another package that names none
 LARGEST = 512 * 2**20  # bytes of a notebook with its outputs
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
 
@@ -194,8 +197,23 @@ def _output_for_jupyter(output: NotebookNode) -> NotebookNode | None:
 
 
 def report_names(folder: Path = SHIPPED) -> list[str]:
-    """The names of the reports whose notebooks are in a folder, in the order of the index."""
-    return [name for name in NAMES if _find_notebook(folder, name).exists()]
+    """The names of the reports whose notebooks are in a folder, in the order of the index.
+
+    To those that are shipped, the reports of other packages are added.
+    """
+    names = [name for name in NAMES if _find_notebook(folder, name).exists()]
+    if folder == SHIPPED:
+        names += find_outside_notebooks(NAMES)
+    return names
+
+
+def find_groups() -> dict[str, list[str]]:
+    """The headings of the index with the names of their reports, those of other packages last."""
+    groups = {heading: [*names] for heading, names in GROUPS.items()}
+    for name in find_outside_notebooks(NAMES):
+        about = parse_notebook(name).metadata.get("dess", {})
+        groups.setdefault(str(about.get("group", OTHERS)), []).append(name)
+    return groups
 
 
 def read_report(name: str, folder: Path = SHIPPED) -> Report:
@@ -218,7 +236,12 @@ def parse_notebook(name: str, folder: Path = SHIPPED) -> NotebookNode:
 
 
 def make_report(name: str, original: NotebookNode) -> Report:
-    """The report of a notebook, which begins with its heading."""
+    """The report of a notebook, which begins with its heading.
+
+    Raises:
+        InputError: If the notebook is no report.
+    """
+    _check_notebook(name, original)
     title, description = original.cells[0].source.removeprefix("# ").split("\n\n", 1)
     notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
@@ -227,6 +250,25 @@ def make_report(name: str, original: NotebookNode) -> Report:
     scripts = (about.get("scripts", False), about.get("simulates", False))
     description = " ".join(description.split())
     return Report(name, title, description, *results, *scripts, original, notebook)
+
+
+def _check_notebook(name: str, notebook: NotebookNode) -> None:
+    """Refuse a notebook that lacks what a report must have.
+
+    Raises:
+        InputError: If it does.
+    """
+    start = notebook.cells[0].source if notebook.cells else ""
+    studies = notebook.metadata.get("dess", {}).get("studies")
+    if not start.startswith("# ") or "\n\n" not in start:
+        problem = "its notebook does not begin with a heading and a paragraph"
+    elif not isinstance(studies, list) or not all(isinstance(study, str) for study in studies):
+        problem = "the metadata of its notebook have no list of studies"
+    elif not any(PARAMETERS in cell_tags(cell) for cell in notebook.cells):
+        problem = f"its notebook has no cell tagged {PARAMETERS}"
+    else:
+        return
+    raise InputError(f"report {name}", problem, "a notebook as those of dess are")
 
 
 OF_EXAMPLE = ("fields", "prices", "requirements")
@@ -261,9 +303,12 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
 
 
 def _find_notebook(folder: Path, name: str) -> Path:
-    """The file of a notebook, in the folder or in one of its folders."""
+    """The file of a notebook, in the folder or in one of its folders, or in another package."""
     file = f"{name.replace('-', '_')}.py"
-    return next(iter(paths_in(folder, f"*/{file}")), folder / file)
+    path = next(iter(paths_in(folder, f"*/{file}")), folder / file)
+    if folder != SHIPPED or path.exists():
+        return path
+    return find_outside_notebooks(NAMES).get(name, path)
 
 
 def cell_tags(cell: NotebookNode) -> list[str]:

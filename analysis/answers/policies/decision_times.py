@@ -1,4 +1,4 @@
-"""How long policies take to decide: a benchmark, kept in a file beside the results."""
+"""How long policies take to decide: a benchmark, kept in the results folder of a study."""
 
 import platform
 from collections.abc import Callable, Mapping
@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 
 from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
-from dess.analysis.answers.missions import FOLDER
 from dess.analysis.answers.policies.pairs import Pair
 from dess.analysis.figures import style
 from dess.analysis.figures.style import plot_front
@@ -23,7 +22,6 @@ from dess.analysis.stats.front import on_front
 from dess.analysis.study.stopping import Text
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
-from dess.base.files.writing import check_target, write_file
 from dess.model.view import View
 from dess.policies.registry import Policy, load_team
 
@@ -31,6 +29,7 @@ CALLS = 60  # calls of every policy that are timed at least: those of about one 
 # In batches: the most design points, and the missions of each that are simulated side by side; one
 # of a policy that is too slow for many (``Policy.chunk``).
 POINTS, SIDE_BY_SIDE = 20, 16
+_DOCUMENT = "times"  # in which they are kept
 SLOW = 0.95  # the quantile that is reported for slow calls
 Clock = Callable[[], float]
 # Called with the number of policies done and of all policies.
@@ -63,38 +62,28 @@ class Times(Document):
     costs: list[Cost]
 
 
-def ensure_decision_times(
-    folder: str | Path, results: Results, progress: Progress | None = None
-) -> None:
-    """Measure the times and write them, unless the folder has those of this study.
+def ensure_decision_times(results: Results, progress: Progress | None = None) -> None:
+    """Measure the times and keep them (``Derived``), unless they are there.
 
     Args:
-        folder: A folder that contains a results folder per study.
         results: The results of the study.
         progress: Called after every policy.
 
     Raises:
         InputError: If the times cannot be written.
     """
-    path = _decision_times_file(folder, results)
-    if not path.exists():
-        check_target(path)
-        write_file(
-            path, measure_decision_times(results, progress=progress).model_dump_json(indent=1)
-        )
+    derived = results.store.derived
+    if not derived.has(_DOCUMENT):
+        derived.keep(_DOCUMENT, measure_decision_times(results, progress=progress))
 
 
-def read_decision_times(folder: str | Path, results: Results) -> Times:
+def read_decision_times(results: Results) -> Times:
     """Read the times that ``ensure_decision_times`` has written.
 
     Raises:
         InputError: If there are none, or they are damaged.
     """
-    return Times.load(_decision_times_file(folder, results), "what is made by: dess report")
-
-
-def _decision_times_file(folder: str | Path, results: Results) -> Path:
-    return Path(folder, FOLDER, f"times-{results.store.manifest.key}.json")
+    return results.store.derived.load(_DOCUMENT, Times, "what is made by: dess report")
 
 
 def measure_decision_times(

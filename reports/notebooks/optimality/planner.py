@@ -44,7 +44,7 @@ from dess.reports.pages.tables import make_table
 
 # %%
 study, bounded = (load_results(f"{results}/{name}") for name in ("planning", "gap"))
-times = read_decision_times(results, study)
+times = read_decision_times(study)
 planners = [planner, *(name for name in [longer] if name in study.policies)]
 differences = answers.compare_with_learner(study, planners, learner)
 pair = pair_of(study, planner, learner)

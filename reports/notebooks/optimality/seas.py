@@ -35,7 +35,7 @@ study, landing, horizon = (
 reference = reference or seas.reference_of(study)
 for name in (policy, reference, heuristic):
     study.check_policy(name)
-times = read_decision_times(results, study)
+times = read_decision_times(study)
 
 # %%
 make_answer(seas.unseen_seas_sentence(study, times, policy, reference, heuristic))

@@ -1,5 +1,7 @@
 """How a team shares out the nodes, on layouts worked by hand."""
 
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,10 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess import load_scenario
-from dess.analysis import run_study
+from dess import InputError, load_scenario
+from dess.analysis import load_results, run_study
 from dess.analysis.answers import missions
+from dess.analysis.results.chunks import DERIVED
 from dess.analysis.results.resimulate import LoggedMission
+from dess.analysis.results.tables import Results
 from tests.analysis.small import SHEET, grid, small_study, write_scenario
 
 
@@ -25,33 +29,59 @@ def results(studied):
 WANTED = [("greedy", 1), ("random", 0)]
 
 
-def test_kept_logs_are_those_that_the_study_keeps(results, tmp_path):
+def logs_in(results: Results) -> dict[Path, bytes]:
+    """The files of the logs that are kept, and their bytes."""
+    folder = results.store.folder / DERIVED
+    return {path: path.read_bytes() for path in folder.glob("*.parquet")}
+
+
+def test_kept_logs_are_those_that_the_study_keeps(results):
     """They are kept: a second call writes nothing, but in place of a damaged file."""
-    assert missions.kept_missions(results, WANTED, tmp_path) == []
+    assert missions.kept_missions(results, WANTED) == []
     steps: list[tuple[int, int]] = []
-    missions.keep_logs(results, WANTED, tmp_path, lambda *step: steps.append(step))
+    missions.keep_logs(results, WANTED, lambda *step: steps.append(step))
     assert steps == [(1, 2), (2, 2)]
-    kept = missions.kept_missions(results, WANTED, tmp_path)
+    kept = missions.kept_missions(results, WANTED)
     for (policy, replication), mission in zip(WANTED, kept, strict=True):
         same = LoggedMission.of(results, policy, 0, replication)
         pd.testing.assert_frame_equal(mission.events, same.events)
         assert mission.record.equals(same.record) and mission.scenario == same.scenario
-    files = {path: path.read_bytes() for path in (tmp_path / missions.FOLDER).iterdir()}
+    files = logs_in(results)
     damaged = min(files)
     damaged.write_bytes(b"damaged")
     before = max(files).stat().st_mtime_ns
-    missions.keep_logs(results, WANTED, tmp_path, print)
-    assert {path: path.read_bytes() for path in files} == files
+    missions.keep_logs(results, WANTED, print)
+    assert logs_in(results) == files
     assert max(files).stat().st_mtime_ns == before
 
 
 def test_logs_of_other_results_and_of_other_records_are_not_shown(results, tmp_path):
-    missions.keep_logs(results, WANTED, tmp_path, print)
+    missions.keep_logs(results, WANTED, print)
     other = run_study(small_study(tmp_path, seed=8, missions=2), tmp_path / "other")
-    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+    shutil.copytree(results.store.folder / DERIVED, other.store.folder / DERIVED)
+    assert missions.kept_missions(other, WANTED[:1]) == []
     other.missions["slots"] += 1  # as of other code
-    missions.keep_logs(other, WANTED[:1], tmp_path, print)
-    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+    missions.keep_logs(other, WANTED[:1], print)
+    assert missions.kept_missions(other, WANTED[:1]) == []
+
+
+def test_what_is_kept_is_no_part_of_the_results(results):
+    """Neither their key, nor what there is to do, nor the logs that are checked."""
+    before = results.store.manifest.key, results.store.files
+    missions.keep_logs(results, [("greedy", 5)], print)
+    again = load_results(results.store.folder).store
+    assert (again.manifest.key, again.files) == before
+    assert not any(replication == 5 for _, replication in again.logged)
+
+
+def test_nothing_is_written_where_a_link_leads(results, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(results.store.folder, folder, ignore=shutil.ignore_patterns(DERIVED))
+    (tmp_path / "elsewhere").mkdir()
+    (folder / DERIVED).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="is a link"):
+        missions.keep_logs(load_results(folder), WANTED, print)
+    assert not [*(tmp_path / "elsewhere").iterdir()]
 
 
 SQUARE = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])

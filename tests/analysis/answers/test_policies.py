@@ -289,13 +289,13 @@ def test_policies_that_are_files_are_not_run_and_have_no_times(measured):
     assert measured.costs[0].calls >= CALLS
 
 
-def test_they_are_measured_once_for_the_same_results(timed_study, tmp_path, monkeypatch):
+def test_they_are_measured_once_for_the_same_results(timed_study, monkeypatch):
     with pytest.raises(InputError, match=r"no such file; allowed: what is made by: dess report$"):
-        read_decision_times(tmp_path, timed_study)
+        read_decision_times(timed_study)
     steps = []
-    ensure_decision_times(tmp_path, timed_study, lambda *step: steps.append(step))
+    ensure_decision_times(timed_study, lambda *step: steps.append(step))
     assert steps == [(1, 3), (2, 3), (3, 3)]
-    kept = read_decision_times(tmp_path, timed_study)
+    kept = read_decision_times(timed_study)
     monkeypatch.delattr(decision_times, "measure_decision_times")
-    ensure_decision_times(tmp_path, timed_study)
-    assert read_decision_times(tmp_path, timed_study) == kept
+    ensure_decision_times(timed_study)
+    assert read_decision_times(timed_study) == kept

@@ -46,7 +46,7 @@ def test_bays_have_land_and_invented_nodes_within_reach(name):
 
 def test_the_shipped_scenarios_are_the_papers_and_bays():
     assert scenario_names() == sorted(
-        ["bay", "fig1", "fig4", "jade-bight", "jade-lora", "paper", *BAYS]
+        ["bay", "fig1", "fig4", "jade-bight", "jade-lora", "new-jersey", "paper", *BAYS]
     )
     assert sum(len(load_scenario(name).zones) for name in BAYS) == 8
     paper, fig4 = load_scenario("paper"), load_scenario("fig4")

@@ -15,7 +15,7 @@ Changes = Callable[[str], st.SearchStrategy[Step]]  # of a file or folder of a c
 
 NODES = ("fifo", "zero", "full", "null", "folder", "loop", "dangling", "socket", "secret")
 # Files that a folder may have beside those that are there.
-_OTHERS = (".lock", ".index.lock", "manifest.json", "config.json", "cross-check/times.json")
+_OTHERS = (".lock", ".index.lock", "manifest.json", "config.json", "derived/times.json")
 # Modules that Python, Jupyter or a study might import from the folder that it works in.
 _PLANTED = (
     *("pandas.py", "numpy.py", "sitecustomize.py", "usercustomize.py", "ipykernel_launcher.py"),

@@ -10,9 +10,9 @@ import pytest
 
 from dess import InputError
 from dess.analysis import load_results
-from dess.analysis.answers.missions import FOLDER
 from dess.analysis.answers.policies import decision_times
 from dess.analysis.answers.policies.decision_times import Cost, Times
+from dess.analysis.results.chunks import DERIVED
 from dess.analysis.results.tables import Results
 from dess.reports.pages.notebook import NAMES, read_report
 from dess.reports.pages.page import STUDY, Page
@@ -134,7 +134,7 @@ def test_all_pages_are_the_same_bytes_elsewhere(pages, results, out, tmp_path, m
     # Simulated anew, like the missions drawn.
     for asked in ("what-if", "sweeps"):
         shutil.rmtree(copy / asked)
-    for path in (copy / FOLDER).glob("*.parquet"):
+    for path in copy.glob(f"*/{DERIVED}/*.parquet"):
         path.unlink()
     render([], copy, tmp_path / "new", parameters=QUICK)
     for name, html in pages.items():

@@ -7,7 +7,7 @@ from dess import InputError
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.ask.answer import sweep
-from dess.analysis.ask.limits import find_limits, place_of_limits
+from dess.analysis.ask.limits import find_limits, limits_of
 from dess.analysis.ask.question import sweep_question
 from dess.analysis.metrics import LEAST, NODE_RATIOS, PRODUCT
 from tests.analysis.small import SHEET, found_of, write_scenario
@@ -64,7 +64,7 @@ def test_the_worst_node_and_the_oldest_age_are_requirements_like_others(tmp_path
     assert "hardly served" not in facts
     assert "at least 0.195 and a mean age of the oldest node of" in answer.guarantee
     find_limits(answer.results, str(scenario), missions=10)
-    assert place_of_limits(answer.results).exists()
+    assert limits_of(answer.results) is not None
 
 
 REFUSED = {

@@ -63,7 +63,7 @@ def test_an_hour_is_closed_by_the_first_reason(write):
         *[wind, waves, State.NIGHT],
     ]
     hours = hours_of(space_of(path, limits=limits))
-    assert hours.names == {1: "night", 2: "missing", 3: "wind", 4: "waves", 5: "wind"}
+    assert hours.names == {1: "night", 2: "missing", 3: "wind", 4: "limits.waves", 5: "limits.wind"}
 
 
 def test_a_limit_may_be_the_least_value(write):

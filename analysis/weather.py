@@ -1,0 +1,94 @@
+"""What the hourly weather of a scenario leaves to UAVs: as numbers for programs, and in lines."""
+
+from typing import Any
+
+import numpy as np
+
+from dess.analysis import numbers
+from dess.base.errors import listed
+from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather.hours import Year, hours_of, years
+from dess.scenario.weather.windows import longest_gap, shares_of, windows_of
+
+# What closes an hour in words, by the name of its share; others are limits.
+_CLOSED = {"night": "not operating", "missing": "without a value", "wind": "too windy to fly"}
+
+_LEAST = 0.0005  # the least share that a line tells
+
+
+def weather_facts(space: ScenarioSpace) -> dict[str, Any]:
+    """What the weather of a scenario leaves to UAVs; nothing is simulated.
+
+    Args:
+        space: A scenario with ``[weather]``.
+
+    Returns:
+        The hours of the file and its whole calendar years; of their hours, or of all without such
+        a year, the share that is open and that each reason closes, and the share of the operating
+        hours that is open; the mean number of windows a year; the median and the largest of the
+        longest gaps of the years [h]; the hours of the file without a row, and without a value by
+        column, for the columns that count.
+
+    Raises:
+        InputError: As ``hours_of``.
+    """
+    hours = hours_of(space)
+    whole = years(hours)
+    counted = whole or [Year(0, 0, len(hours.state))]
+    of_years = [shares_of(hours, year) for year in counted]
+    lengths = np.array([year.hours for year in counted])
+    shares = {
+        name: float(np.average([of_year[name] for of_year in of_years], weights=lengths))
+        for name in of_years[0]
+    }
+    assert space.units
+    longest = space.weather.longest_hours
+    windows = [len(windows_of(hours, year, longest, space.units.slot)) for year in counted]
+    gaps = [longest_gap(hours, year) for year in counted]
+    operating = 1 - shares["night"]
+    missing = hours.series.missing
+    counting = [name for name in ("wind", "from", *hours.limits) if missing.get(name)]
+    return {
+        "file": space.weather.file,
+        "hours": len(hours.series.wind),
+        "years": [year.year for year in whole],
+        "shares": shares,
+        "open_of_operating": shares["open"] / operating if operating else 0.0,
+        "windows": float(np.mean(windows)),
+        "longest_gap_h": {"median": float(np.median(gaps)), "largest": max(gaps)},
+        "without_row": hours.series.without_row,
+        "missing": {name: missing[name] for name in counting},
+    }
+
+
+def weather_lines(space: ScenarioSpace) -> list[str]:
+    """``weather_facts`` in lines."""
+    facts = weather_facts(space)
+    found = facts["years"]
+    about = f"weather: {facts['hours']:,} hours"
+    if found:
+        number = numbers.format_count(len(found), "whole year")
+        span = str(found[0]) if len(found) == 1 else f"{found[0]} to {found[-1]}"
+        about += f" with {number}, {span}"
+    else:
+        about += " without a whole calendar year, so that no year can be simulated"
+    closed = [
+        f"{100 * share:.1f} % {_CLOSED.get(name) or f'beyond {name}'}"
+        for name, share in facts["shares"].items()
+        if name != "open" and share >= _LEAST
+    ]
+    is_open = f"{100 * facts['shares']['open']:.1f} % of the hours are open"
+    windows = f"{facts['windows']:,.0f} windows of at most {space.weather.longest}"
+    gap = facts["longest_gap_h"]
+    gaps = f"the longest gap is {gap['largest']:g} h"
+    if len(found) > 1:
+        windows = windows.replace(" of", " a year, each of", 1)
+        gaps = f"the longest gap of a year is {gap['median']:g} h in the median, "
+        gaps += f"{gap['largest']:g} h at most"
+    operating = f"of the operating hours {100 * facts['open_of_operating']:.1f} % are open"
+    lines = [about, ", ".join([is_open, *closed]), f"{operating}: {windows}; {gaps}"]
+    if facts["missing"]:
+        named = [f"{name} {count:,}" for name, count in facts["missing"].items()]
+        rows = f", {facts['without_row']:,} of them without a row" if facts["without_row"] else ""
+        lines.append(f"hours without a value: {listed(named)}{rows}")
+    return lines
