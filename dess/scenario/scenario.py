@@ -338,8 +338,8 @@ def _of_values(
         of_nodes = {field: placed.pop(field) for field in AMOUNTS if field in placed}
         values = merged(placed, read_values)
         values = merged(values, of_nodes)
-    _tell_of_weather(where, values)
     space = validated(ScenarioSpace, values, where, context)
+    _tell_of_weather(where, values, space)
     if not is_scenario_name(str(name_or_path)) and distance_error(space) >= TOLD_ERROR:
         tell(f"{where}: {distance_sentence(space)}")
     return space
@@ -356,12 +356,13 @@ def _with_weather_beside(name_or_path: str | Path, read: dict[str, Any]) -> dict
     return {**read, "weather": {**weather, "file": str(beside.absolute())}}
 
 
-def _tell_of_weather(where: str, values: dict[str, Any]) -> None:
-    """Tell what of a data sheet the weather takes the place of."""
-    sheet = values.get("data_sheet")
-    if not (values.get("weather") and isinstance(sheet, dict)):
+def _tell_of_weather(where: str, values: dict[str, Any], space: ScenarioSpace) -> None:
+    """Tell what of a data sheet the weather of the scenario has taken the place of."""
+    if not space.weather.is_on:
         return
-    names = [f"data_sheet.{name}" for name in REPLACED if sheet.get(name)]
+    typed = dotted(values)
+    fields = [f"data_sheet.{name}" for name in REPLACED]
+    names = [name for name in fields if name in typed and typed[name] != space.value(name)]
     if names:
         tell(f"{where}: the series of weather.file takes the place of {listed(names)}")
 

@@ -259,10 +259,13 @@ def _refuse_number(value: str, where: str, is_amount: bool = True) -> None:
 
 
 def takes_quantities(field: str) -> bool:
-    """Whether a field of a scenario has quantities, such as ``35 min``."""
+    """Whether a field has quantities, such as ``35 min``, or other text of the weather."""
     from dess.scenario.data_sheet import DataSheet
+    from dess.scenario.weather import Weather
 
     section, _, name = field.partition(".")
+    if section == "weather" and name in Weather.model_fields:
+        return Weather.model_fields[name].annotation is str
     return section == "data_sheet" and name in DataSheet.model_fields
 
 

@@ -72,7 +72,11 @@ _NDBC = {
     "TIDE": ("TIDE", "ft", 99),
 }
 _NDBC_HEAD = re.compile(r"#?(YY|YYYY)\s+MM\s+DD\s+hh\s")
-_NDBC_TIME = (("YY", "YYYY", "#YY"), "MM", "DD", "hh", "mm")
+# The columns of its times, with the least and the most that they may hold.
+_NDBC_TIME = (
+    (("YY", "YYYY", "#YY", "#YYYY"), 0, 9999),
+    *((("MM",), 1, 12), (("DD",), 1, 31), (("hh",), 0, 23), (("mm",), 0, 59)),
+)
 # The form of times that are read, in parts: date, time, fractions of a second, offset.
 _ISO = (
     r"^(\d{4}-\d\d-\d\d)(?:[T ](\d\d(?::\d\d(?::\d\d)?)?)(?:\.\d+)?\s*(Z|[+-]\d\d(?::?\d\d)?)?)?$"
@@ -108,7 +112,7 @@ def read_rows(path: Path, units: Mapping[str, str]) -> tuple[Rows, bytes]:
     if ending in _READERS:
         rows = _READERS[ending](content, path, units)
     else:
-        rows = read_by_others(path, Rows, _READERS)
+        rows = read_by_others(path, _rows_of_others, _READERS)
     for name, values in rows.columns.items():
         if name in UNITS:
             unit, (least, most) = UNITS[name]
@@ -119,6 +123,15 @@ def read_rows(path: Path, units: Mapping[str, str]) -> tuple[Rows, bytes]:
                 allowed = f"{least:g}..{most:g} {unit}, and empty where it is missing"
                 raise InputError(path, first, allowed)
     return rows, content
+
+
+def _rows_of_others(times: Any, columns: Mapping[str, Any]) -> Rows:
+    """The rows that the reader of another package returns."""
+    stamps = np.asarray(times).astype("datetime64[s]")
+    values = {str(name): np.array(column, float) for name, column in columns.items()}
+    if any(column.shape != stamps.shape for column in values.values()) or np.isnat(stamps).any():
+        raise ValueError("there is not a time for each value")
+    return Rows(stamps, values)
 
 
 def known_name(name: str) -> str:
@@ -301,10 +314,10 @@ def _read_ndbc(text: str, path: Path) -> Rows:
     packed = "\n".join(",".join(line.split()) for line in (head, *rows))
     table = parse_columns(packed, path, ",")
     parts: list[Any] = []
-    for names in _NDBC_TIME:
+    for names, least, most in _NDBC_TIME:
         name = next((n for n in table.column_names if n in names), None)
-        minutes = 0 if name is None else _integers_of(table[name], f"{path}: {name}")
-        parts.append(minutes)
+        part = 0 if name is None else _integers_of(table[name], f"{path}: {name}", least, most)
+        parts.append(part)
     years, months, days, hours, minutes = parts
     years = years + 1900 * (years < 100)
     dates = (years - 1970).astype("datetime64[Y]").astype("datetime64[M]") + (months - 1)
@@ -325,12 +338,15 @@ def _read_ndbc(text: str, path: Path) -> Rows:
     return Rows(times, columns)
 
 
-def _integers_of(column: pa.ChunkedArray, where: str) -> Any:
+def _integers_of(column: pa.ChunkedArray, where: str, least: int, most: int) -> np.ndarray:
     """(R,) the integers of a column of texts."""
     try:
-        return column.cast(pa.int64()).to_numpy()
+        numbers = np.asarray(column.cast(pa.int64()).to_numpy())
     except pa.ArrowInvalid:
-        raise InputError(where, "has no whole numbers", "years, months, days and hours") from None
+        raise InputError(where, "has no whole numbers", f"{least}..{most}") from None
+    if numbers.min() < least or numbers.max() > most:
+        raise InputError(where, f"is {numbers.min()} to {numbers.max()}", f"{least}..{most}")
+    return numbers
 
 
 _READERS: Mapping[str, Callable[[bytes, Path, Mapping[str, str]], Rows]] = {

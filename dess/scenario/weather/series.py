@@ -22,6 +22,7 @@ from dess.scenario.weather.formats import FROM, U10, V10, WIND, Rows, known_name
 
 HOUR = np.timedelta64(1, "h")
 LONGEST_STEP = np.timedelta64(3, "h")
+MOST_YEARS = 200  # of a series
 BEGIN, END = "begin", "end"
 
 
@@ -102,6 +103,9 @@ def _read_version(
     if step > LONGEST_STEP:
         hours = step / HOUR
         raise InputError(path, f"has a row every {hours:g} h", "3 h at most")
+    if times[-1] - times[0] > MOST_YEARS * 366 * 24 * HOUR:
+        problem = f"has rows from {times[0]} to {times[-1]}"
+        raise InputError(path, problem, f"{MOST_YEARS} years at most")
     if stamps == END:
         times = times - step
     first = -((-times[0].astype("datetime64[s]").astype(np.int64)) // 3600)

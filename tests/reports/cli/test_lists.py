@@ -46,6 +46,19 @@ def test_a_scenario_is_shown_field_by_field(dess, dess_json):
     assert fields["pads"]["allowed"] == "an integer 1..6"
 
 
+def test_hourly_weather_is_shown_without_a_simulation(dess, dess_json):
+    settings = ("--set", "weather.longest=8 h", "--set", "weather.operating=06:00-18:00")
+    code, out, _ = dess("scenarios", "show", "new-jersey", *settings)
+    lines = [line for line in out.splitlines() if "hours" in line]
+    assert code == 0
+    assert lines[0] == "weather: 271,752 hours with 31 whole years, 1990 to 2020"
+    assert "50.0 % not operating" in lines[1]
+    assert "windows a year, each of at most 8 h; the longest gap of a year is" in lines[2]
+    facts = dess_json("scenarios", "show", "new-jersey", *settings)["weather"]
+    assert sum(facts["shares"].values()) == pytest.approx(1)
+    assert f"{100 * facts['shares']['open']:.1f} % of the hours are open" in lines[1]
+
+
 def test_a_scenario_of_ones_own_may_have_a_description(dess, dess_json, tmp_path):
     (tmp_path / "mine.toml").write_text('description = "my bay"\nuavs = 2\n')
     assert dess_json("scenarios", "show", "mine.toml")["description"] == "my bay"

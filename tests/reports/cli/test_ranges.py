@@ -20,6 +20,9 @@ VALUES = {
     "arrivals.service=newest, oldest": ("newest", "oldest"),
     "arrivals.process=continuous": ("continuous",),
     "data_sheet.wind=5 m/s from W": ("5 m/s from W",),
+    "weather.operating=daylight,06:00-18:00": ("daylight", "06:00-18:00"),
+    "weather.longest=4 h,6 h": ("4 h", "6 h"),
+    'weather.limits={waves = "1 m"},{waves = "2 m"}': ({"waves": "1 m"}, {"waves": "2 m"}),
     "data_sheet.data_rate=20 kB/h, 3 MB/h": ("20 kB/h", "3 MB/h"),
     'data_sheet.data_rate="20 kB/h","3 MB/h"': ("20 kB/h", "3 MB/h"),
     "data_sheet.backlog=[1 kB, 2 kB],[3 kB,4 kB]": (["1 kB", "2 kB"], ["3 kB", "4 kB"]),
@@ -39,6 +42,10 @@ QUANTITIES = {
     "data_sheet.backlog=3,5 MB": "3,5 MB",
     "data_sheet.backlog=[1 kB, 2 kB]": ["1 kB", "2 kB"],
     "data_sheet.wind='5 m/s from W'": "5 m/s from W",
+    "weather.longest=8 h": "8 h",
+    "weather.operating=06:00-18:00": "06:00-18:00",
+    "weather.file=../my buoy.csv": "../my buoy.csv",
+    'weather.limits={waves = "1.5 m"}': {"waves": "1.5 m"},
 }
 
 

@@ -1,4 +1,7 @@
-"""Files of weather in the forms in which people have them, each with the hours that follow."""
+"""Files of weather in the forms in which people have them, each with the hours that follow.
+
+``NDBC`` is a year of the National Data Buoy Center, a US agency: its data are in the public domain.
+"""
 
 from pathlib import Path
 
@@ -252,6 +255,21 @@ def test_an_old_file_has_no_minutes_and_short_years(read):
     assert series.wind.tolist() == [4.8, 0, 4] and series.origin.tolist() == [316, 0, 310]
 
 
+def test_times_that_cannot_be_are_refused(read):
+    row = "316  4.8  6.0  0.92  5.56  4.88 999 1008.1   6.8   8.1   6.8 99.0"
+    for when in ("98 13 01 00", "98 01 32 00", "98 01 01 24", "98 xx 01 00"):
+        with pytest.raises(InputError, match="old.txt: .*; allowed: [01]..[0-9]+"):
+            read(f"{OLD}\n98 01 01 00 {row}\n{when} {row}\n", "old.txt")
+    with pytest.raises(InputError, match="old.txt: is not a CSV file"):
+        read(f"{OLD}\n98 01 01 00 {row}\n98 01 01 01 {row} 1\n", "old.txt")
+
+
+def test_a_series_ends_after_some_generations(read):
+    lines = rows("5,180", "6,180", "7,180") + "9020-01-01T00:00,5,180\n"
+    with pytest.raises(InputError, match="has rows from 2020-.* to 9020-.*; allowed: 200 years"):
+        read(lines)
+
+
 def test_the_gaps_of_a_year_of_a_buoy_are_not_calm():
     """Verification 9: NDBC's buoy 44005 in 2012, whose rows stand at :50, and end in December."""
     series = read_series(NDBC, {})
@@ -303,6 +321,12 @@ def read(path):
     entry = {".hourly": "hourly_reader:read"}
     install_package(tmp_path / "site", monkeypatch, "hourly_reader", code, "dess.readers", **entry)
     assert read_series(path, {}).wind.tolist() == [5, 6]
+    path.write_text("5 -7")
+    with pytest.raises(InputError, match="wind is -7 m/s"):
+        read_series(path, {})
+    path.write_text("5 calm")
+    with pytest.raises(InputError, match="cannot be read by hourly_reader:read: ValueError"):
+        read_series(path, {})
 
 
 def test_a_file_that_changes_is_read_again(read, tmp_path):
