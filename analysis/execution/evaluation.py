@@ -42,6 +42,7 @@ from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
 from dess.model.processes import load_processes
 from dess.model.record import (
+    AGES_OF_MONTHS,
     MISSION_RECORD,
     NODE_RECORD,
     OPERATIONS,
@@ -211,7 +212,8 @@ def of_results(results: Results) -> list[Evaluation]:
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
         metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in recorded_metrics()}
-        measured = [name for name in YEAR_OPERATIONS.names or () if name in rows]
+        names = [name for name in YEAR_OPERATIONS.names or () if name not in AGES_OF_MONTHS]
+        measured = [name for name in names if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             if name not in NODES_BEHIND:
                 metrics[name] = rows[name].to_numpy(float)
@@ -272,7 +274,9 @@ def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarr
     """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in recorded_metrics()}
     if len(records.operations):
-        values |= {n: records.operations[n] for n in records.operations.dtype.names or ()}
+        names = records.operations.dtype.names or ()
+        measured = [name for name in names if name not in AGES_OF_MONTHS]
+        values |= {name: records.operations[name] for name in measured}
     if space.units:
         values |= columns_in_units(values, space.units)
     metrics: dict[Key, np.ndarray] = {m: column.astype(float) for m, column in values.items()}

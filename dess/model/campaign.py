@@ -11,8 +11,10 @@ before it has ended, and with what has come in between. The times of a campaign 
 milliseconds from the beginning of its year, those of a window are its mission slots.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterable
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from math import fsum
 from typing import NamedTuple
 
@@ -21,7 +23,7 @@ import numpy as np
 from dess.base.elementary import exp, log
 from dess.base.errors import InputError
 from dess.base.kernels import inlined, kernel
-from dess.model.record import UAV_RECORD, MissionRecord, Records
+from dess.model.record import AGES_OF_MONTHS, UAV_RECORD, MissionRecord, Records
 from dess.model.rules import draw_idle_data
 from dess.model.state import BATTERY, LOST, Starts, State, constants_of, types_of
 from dess.physics import streams
@@ -54,7 +56,8 @@ class YearWindow(NamedTuple):
     costs: np.ndarray
 
 
-class YearPlan(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class YearPlan:
     """What the weather of a year lets a fleet do.
 
     Attributes:
@@ -68,6 +71,17 @@ class YearPlan(NamedTuple):
     hours: int
     operating: int
     windows: list[YearWindow]
+
+    @cached_property
+    def month_ends(self) -> list[int]:
+        """The hours of the year in which its months end."""
+        starts = np.arange(f"{self.year}-02", f"{self.year + 1}-02", dtype="datetime64[M]")
+        begin = np.datetime64(f"{self.year}-01-01T00")
+        return (starts.astype("datetime64[h]") - begin).astype(int).tolist()
+
+    def month_of(self, hour: int) -> int:
+        """The month of an hour of the year, from 0 on."""
+        return bisect_right(self.month_ends, hour)
 
     @property
     def open_share(self) -> float:
@@ -300,7 +314,8 @@ class Campaign:
         nodes = len(self.data)
         newest = np.rint(sensors["newest"][:nodes] * self.slot).astype(np.int64)
         self.totals.arrived += record.nodes["initial"] - self.data  # in the gap before the window
-        self.totals.count_window(record, mission, sensors["late"])
+        month = self.plan.month_of(self.plan.windows[self.next].first)
+        self.totals.count_window(record, mission, sensors["late"], month)
         self.emptied = np.where(newest > 0, self.clock + newest, self.emptied)
         self.clock += round(int(mission["slot"]) * self.slot)
         self.data, self.silent = record.nodes["residual"].copy(), sensors["silent"].copy()
@@ -329,11 +344,14 @@ class Campaign:
         self._write_year(records, row, end / self.slot)
 
     def _count_closed(self, until: int) -> None:
-        """Count the ages from the end of the last window to a time [ms]."""
-        age = (self.clock - self.emptied) / self.slot
-        gap = (until - self.clock) / self.slot
-        self.totals.age_area += (age + gap / 2) * gap
-        self.clock = until
+        """Count the ages from the end of the last window to a time [ms], month by month."""
+        while self.clock < until:
+            month = self.plan.month_of(self.clock // HOUR)
+            end = min(until, self.plan.month_ends[month] * HOUR)
+            age = (self.clock - self.emptied) / self.slot
+            gap = (end - self.clock) / self.slot
+            self.totals.count_ages((age + gap / 2) * gap, month)
+            self.clock = end
 
     def _write_year(self, records: Records, row: int, slots: float) -> None:
         """Write the record of a year of so many slots."""
@@ -369,6 +387,9 @@ class Campaign:
         out["late"] = fsum(self.rates * totals.late) / (fsum(self.rates) * slots)
         out["open"], out["longest_gap"] = self.plan.open_share, self.plan.longest_gap
         out["windows"] = totals.windows
+        hours = np.diff(self.plan.month_ends, prepend=0)
+        for name, area, length in zip(AGES_OF_MONTHS, totals.area_of_month, hours, strict=True):
+            out[name] = area / (length * HOUR / self.slot)
         waited = totals.slots_of_uavs("slots_waiting")
         if self.mission[0].has_charging:
             out["pad_requests"] = totals.pad_requests
@@ -389,13 +410,16 @@ class Totals:
         """Begin to count with (K,) initial data of the nodes, for so many UAVs."""
         self.initial = initial.copy()
         self.arrived, self.collected, self.age_area, self.late = np.zeros((4, len(initial)))
+        self.area_of_month = np.zeros(12)
         self.uavs = np.zeros(uavs, UAV_RECORD)
         self.windows = self.slots = self.success = self.home = 0
         self.pad_requests = self.failures = self.slots_grounded = 0
         self.lands = self.lost = 0.0
 
-    def count_window(self, record: MissionRecord, mission: np.void, late: np.ndarray) -> None:
-        """Count a window, whose nodes had (K,) ``late`` data [slots]."""
+    def count_window(
+        self, record: MissionRecord, mission: np.void, late: np.ndarray, month: int
+    ) -> None:
+        """Count a window of a month, whose nodes had (K,) ``late`` data [slots]."""
         assert record.nodes is not None
         self.windows += 1
         self.slots += int(record.slots)
@@ -408,8 +432,13 @@ class Totals:
         self.slots_grounded += int(mission["slots_grounded"])
         self.arrived += record.nodes["arrived"]
         self.collected += record.nodes["collected"]
-        self.age_area += record.nodes["age"] * record.slots
+        self.count_ages(record.nodes["age"] * record.slots, month)
         self.late += late
+
+    def count_ages(self, areas: np.ndarray, month: int) -> None:
+        """Count (K,) areas below the ages of the nodes in a month [slots^2]."""
+        self.age_area += areas
+        self.area_of_month[month] += fsum(areas) / len(areas)
 
     def slots_of_uavs(self, *names: str) -> int:
         """How many slots all UAVs together have spent with something."""

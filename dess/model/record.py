@@ -70,8 +70,14 @@ YEAR_RECORD = np.dtype(
         for name in MISSION_RECORD.names or ()
     ]
 )
+# Last come the mean ages in its months.
+AGES_OF_MONTHS = tuple(f"age_month_{month}" for month in range(1, 13))
 YEAR_OPERATIONS = np.dtype(
-    [*OPERATIONS.descr, *fields(np.float64, "late open windows longest_gap")]
+    [
+        *OPERATIONS.descr,
+        *fields(np.float64, "late open windows longest_gap"),
+        *fields(np.float64, " ".join(AGES_OF_MONTHS)),
+    ]
 )
 
 # One node of a mission: its data [data units], of which ``collected`` is what UAVs have taken from
@@ -291,9 +297,11 @@ class MissionRecord:
     def __getattr__(self, name: str) -> Any:
         if name in (MISSION_RECORD.names or ()):
             return self.metrics[name].item()
-        if name in (YEAR_OPERATIONS.names or ()) and self.operations is not None:
-            if name in (self.operations.dtype.names or ()):
-                return self.operations[name].item()
+        operations = None
+        if name in (YEAR_OPERATIONS.names or ()):  # also while it is unpickled
+            operations = self.operations
+        if operations is not None and name in (operations.dtype.names or ()):
+            return operations[name].item()
         raise AttributeError(name)
 
     def __repr__(self) -> str:
