@@ -28,11 +28,12 @@ from dess.model.rules import draw_idle_data
 from dess.model.state import BATTERY, LOST, Starts, State, constants_of, types_of
 from dess.physics import streams
 from dess.physics.charging import charge_limit, charged_after, slots_to_charge
-from dess.physics.energy import ACTIONS, SPEEDS
+from dess.physics.energy import ACTIONS, SPEEDS, Consumption
 from dess.physics.fleet import slowest
 from dess.scenario.fields import SAMPLED
 from dess.scenario.quantities import measured
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather import Weather
 from dess.scenario.weather.hours import State as HourState
 from dess.scenario.weather.hours import Year, hours_of, years
 from dess.scenario.weather.windows import windows_of
@@ -306,6 +307,19 @@ class Campaign:
         starts.ages[b] = (self.clock - self.emptied) / self.slot
         starts.silent[b] = self.silent
         self._count_closed(begin)
+
+    def scenario_of_window(self) -> ScenarioSpace:
+        """The scenario of the next window, as a mission without weather."""
+        window = self.plan.windows[self.next]
+        costs = tuple(tuple(map(int, row)) for row in window.costs[: slowest(self.space.fleet)])
+        return self.space.model_copy(
+            update={
+                "weather": Weather.off(),
+                "data_sheet": self.space.data_sheet.model_copy(update={"horizon": None}),
+                "max_slots": int(window.hours * HOUR / self.slot + 1e-9),
+                "consumption": Consumption(slots=costs),
+            }
+        )
 
     def end_window(self, record: MissionRecord, state: State, b: int) -> None:
         """Take over what the window of mission ``b`` has ended with."""

@@ -43,8 +43,9 @@ _ORIGINS = {
     "edge_snr": ("snr", *LINK_BUDGET, "free_space", "bandwidth"),
 }
 
-# The fields that a scenario with a sheet may set otherwise.
-OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
+# The fields that a scenario with a sheet may set otherwise; what slots take is another table in a
+# window of weather.
+OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota", "consumption.slots")
 
 
 class DataSheet(Types, Radio):
