@@ -225,7 +225,7 @@ class Campaign:
         repair_in_gap(mission, number, gap, self.silent, grounded)
         for uav, is_grounded in zip(self.fleet, grounded, strict=True):
             uav.state["grounded"] = is_grounded
-        self._charge(gap)
+        self.charge(gap)
         awaited = [arrives for arrives in self.ordered if arrives > begin]
         self.spares += len(self.ordered) - len(awaited)
         self.ordered = awaited
@@ -255,7 +255,7 @@ class Campaign:
                     return True
         return False
 
-    def _charge(self, gap: float) -> None:
+    def charge(self, gap: float) -> None:
         """Charge the UAVs for so many slots, on the working pads of the zones where they stand.
 
         They are charged one after the other, the lowest battery first.
@@ -513,9 +513,9 @@ def repair_in_gap(mission, number, gap, silent, grounded):
 @inlined
 def _is_repaired(mission, number, gap, stream, index, probability):
     """Whether a repair ends within so many slots, of which each ends it with a probability."""
-    if probability <= 0.0:
+    if probability <= 0.0 or gap <= 0.0:
         return False
-    stays = 1.0
+    stays = 0.0
     if probability < 1.0:
         stays = exp(gap * log(1.0 - probability))
     words = streams.block(mission.seed, number, stream, 1, 0, index)
