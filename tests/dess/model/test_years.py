@@ -12,12 +12,12 @@ from dess.model import mission
 from dess.model.campaign import HOUR, MOST_HOURS, Campaign, plan_of, repair_in_gap, years_of
 from dess.model.record import AGES_OF_MONTHS, MissionRecord
 from dess.model.state import BATTERY
-from dess.model.years import start_of_window
+from dess.model.years import WindowStart, start_of_window
 from dess.policies import load
 from dess.scenario.rotary_wing import COURSES, RotaryWing, airspeed_along
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.model.auditor import audit
-from tests.dess.model.test_auditor import constants_of
+from tests.dess.model.test_auditor import check_nodes, constants_of
 
 SHEET = {
     **{"endurance": "35 min", "cruise": "15 m/s", "charging": "40 min", "data_rate": "3 MB/h"},
@@ -36,9 +36,7 @@ def write(tmp_path):
 
     def write(is_open: Any, wind: float = 6.0, origin: float = 225.0) -> Path:
         hours = np.datetime64("2021-01-01T00") + np.arange(8760).astype("timedelta64[h]")
-        rows = [
-            f"{hour}:00,{wind if is_open(h) else ''},{origin}" for h, hour in enumerate(hours)
-        ]
+        rows = [f"{hour}:00,{wind if is_open(h) else ''},{origin}" for h, hour in enumerate(hours)]
         path = tmp_path / f"weather-{len([*tmp_path.iterdir()])}.csv"
         path.write_text("\n".join(["time,wind,from", *rows]))
         return path
@@ -306,6 +304,21 @@ def _audit_windows(space: ScenarioSpace, year: Any, first: int, count: int) -> i
         record = mission.simulate(
             start.scenario, GREEDY, 0, start.replication, starts=start.starts, events=True
         )
-        assert record.events is not None
-        audit(record.events.columns(), constants_of(start.scenario))
+        assert record.events is not None and record.nodes is not None
+        report = audit(record.events.columns(), constants_of(start.scenario) | before(start))
+        check_nodes(record.nodes, report["nodes"])
+        wanted = {n: pytest.approx(record.metrics[n], abs=1e-6) for n in report["metrics"]}
+        assert report["metrics"] == wanted
     return count
+
+
+def before(start: WindowStart) -> dict[str, Any]:
+    """What the auditor has to know of the windows before one."""
+    (record,) = start.starts.constants.view(np.recarray)
+    idle = float(record.idle)
+    uavs = int(start.starts.ranges[0, 0, 0])
+    rows = start.starts.uavs[0, :uavs]
+    full = start.scenario.flying_time[0]
+    batteries = [(u["battery"] if u["x"] >= 0 else full, u["remainder"]) for u in rows]
+    left = start.starts.data[0, :, 0] - np.array(start.scenario.node_rates) * idle
+    return {"before": {"idle": idle, "data": left, "ages": start.starts.ages[0], "uavs": batteries}}
