@@ -76,7 +76,7 @@ class DataSheet(Types, Radio):
     @property
     def assumed(self) -> dict[str, str]:
         """What the sheet does not say, and is assumed."""
-        unused = set()
+        unused = {"delivery"}  # of years with weather alone
         if self.modulation == LORA or self.rates:
             unused.add("max_rate")
         if self.rates:
