@@ -311,7 +311,8 @@ class Campaign:
     def scenario_of_window(self) -> ScenarioSpace:
         """The scenario of the next window, as a mission without weather."""
         window = self.plan.windows[self.next]
-        costs = tuple(tuple(map(int, row)) for row in window.costs[: slowest(self.space.fleet)])
+        rows = window.costs[: slowest(self.space.fleet)].tolist()
+        costs = tuple((north, east, south, west, hover) for north, east, south, west, hover in rows)
         return self.space.model_copy(
             update={
                 "weather": Weather.off(),

@@ -253,7 +253,7 @@ def _print_answer(
             print_facts(assumed)
         console.print_text(f"study: {question.file}")
     page = None
-    absent = missing("reports", f"the page of a {asked}")
+    absent: object = missing("reports", f"the page of a {asked}")
     if question.study.years and asked == WHAT_IF_QUESTION:
         absent = "it draws single missions, and these are years"
     if absent:
