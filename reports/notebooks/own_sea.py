@@ -39,7 +39,7 @@ from dess.analysis.answers.missions import map_caption
 from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
-from dess.analysis.ask.limits import find_limits
+from dess.analysis.ask.limit_search import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
