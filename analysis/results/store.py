@@ -12,7 +12,7 @@ or by how many workers it was computed, but for ``derived/``.
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -389,7 +389,8 @@ class Store:
                 except InputError:
                     return
                 chunk = chunks.Chunk(team, tuple(shared))
-                self.keep("missions", chunk, _tables_of(chunk, frames))
+                (tables,) = _tables_of([chunk], frames)
+                self.keep("missions", chunk, tables)
 
     def merge(self, large: Sequence[chunks.Chunk]) -> None:
         """Keep the missions of a team in the files of these large chunks, in place of small ones.
@@ -404,12 +405,10 @@ class Store:
         large_files = {chunks.name_of(of_file): of_file for of_file in rows}
         if large_files.keys() == names:
             return
-        frames = self._frames(parts)
-        merged = defaultdict(list)
-        for chunk in (chunk for chunk in large if chunk.name not in large_files):
-            self.keep("missions", chunk, _tables_of(chunk, frames))
-        for part in parts:
-            merged[part.cell.key].append(part.replications)
+        new = [chunk for chunk in large if chunk.name not in large_files]
+        for chunk, tables in zip(new, _tables_of(new, self._frames(parts)), strict=True):
+            self.keep("missions", chunk, tables)
+        merged = _joined_ranges(parts)
         gone = {
             name
             for name, of_file in large_files.items()
@@ -417,9 +416,10 @@ class Store:
                 gaps_between(range(start, stop), merged[key]) for key, start, stop in of_file
             )
         }
+        gone -= names
         for folder, _ in self._places("missions", large[0].team):
             for path in parquet.files_in(folder):
-                if parquet.content_hash(path) in gone - names:
+                if parquet.content_hash(path) in gone:
                     delete(path)
         self._scan()
 
@@ -532,7 +532,8 @@ class Store:
 
     def _tables_with(self, kind: str, parts: Iterable[CellPart]) -> list[Sequence[pa.Table]]:
         """The tables that contain some parts."""
-        tables_of_parts = (tables for part in parts for tables in self._tables[kind, part.cell.key])
+        keys = dict.fromkeys(part.cell.key for part in parts)
+        tables_of_parts = (tables for key in keys for tables in self._tables[kind, key])
         return [*{id(tables): tables for tables in tables_of_parts}.values()]
 
     def _incomplete(self, part: CellPart, gap: range) -> InputError:
@@ -605,6 +606,18 @@ def _absent_parts(parts: Iterable[CellPart], present: Present) -> list[CellPart]
     ]
 
 
+def _joined_ranges(parts: Iterable[CellPart]) -> Present:
+    """The replications of each cell, by its key, in as few ranges as there are between gaps."""
+    joined: Present = defaultdict(list)
+    for part in sorted(parts, key=lambda part: part.replications.start):
+        ranges = joined[part.cell.key]
+        if ranges and part.replications.start <= ranges[-1].stop:
+            ranges[-1] = range(ranges[-1].start, max(ranges[-1].stop, part.replications.stop))
+        else:
+            ranges.append(part.replications)
+    return joined
+
+
 def rows_of(parts: Sequence[CellPart], stacked: pd.DataFrame) -> pd.DataFrame:
     """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
 
@@ -612,16 +625,20 @@ def rows_of(parts: Sequence[CellPart], stacked: pd.DataFrame) -> pd.DataFrame:
         parts: The parts.
         stacked: The rows of these missions, and of others, as ``stack_tables`` returns them.
     """
+    rows = _keys_of(parts).merge(stacked, on=["cell", "replication"], how="left")
+    return rows[["point", *stacked]]
+
+
+def _keys_of(parts: Sequence[CellPart]) -> pd.DataFrame:
+    """The ``point``, ``cell`` and ``replication`` of every mission of the parts."""
     lengths = [len(part.replications) for part in parts]
-    keys = pd.DataFrame(
+    return pd.DataFrame(
         {
             "point": np.repeat([part.cell.point for part in parts], lengths),
             "cell": np.repeat([part.cell.key for part in parts], lengths),
             "replication": np.concatenate([part.replications for part in parts]),
         }
     )
-    rows = keys.merge(stacked, on=["cell", "replication"], how="left")
-    return rows[["point", *stacked]]
 
 
 def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
@@ -645,11 +662,26 @@ def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
     return frame
 
 
-def _tables_of(chunk: chunks.Chunk, frames: Iterable[pd.DataFrame]) -> list[pa.Table]:
-    """The tables of a chunk, from frames that have its missions and UAVs among others."""
-    rows = (rows_of(chunk.parts, frame) for frame in frames)
-    columns = ({str(name): of_kind[name].to_numpy() for name in of_kind} for of_kind in rows)
-    return parquet.tables_with(chunk, *columns)
+def _tables_of(
+    of_files: Sequence[chunks.Chunk], frames: Iterable[pd.DataFrame]
+) -> Iterator[list[pa.Table]]:
+    """The tables of chunks, from frames that have their missions and UAVs among others.
+
+    The rows of all chunks are found at once, since to find those of one takes as long.
+    """
+    if not of_files:
+        return
+    keys = _keys_of([part for chunk in of_files for part in chunk.parts])
+    keys["chunk"] = np.repeat(range(len(of_files)), [chunk.missions for chunk in of_files])
+    of_frames = []
+    for frame in frames:
+        rows = keys.merge(frame, on=["cell", "replication"], how="left")
+        ends = np.searchsorted(rows["chunk"], range(len(of_files) + 1))
+        of_frames.append((rows[[*frame]], ends))
+    for number, chunk in enumerate(of_files):
+        parts = (rows.iloc[ends[number] : ends[number + 1]] for rows, ends in of_frames)
+        columns = ({str(name): part[name].to_numpy() for name in part} for part in parts)
+        yield parquet.tables_with(chunk, *columns)
 
 
 def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:

@@ -188,7 +188,6 @@ def train(
             ) from error
         with _limit_threads(training):
             _run_training(training, out, progress)
-            _save_results(out, training)
     return training
 
 
@@ -212,10 +211,15 @@ def _limit_threads(training: Training) -> Iterator[None]:
 def _run_training(
     training: Training, out: Path, progress: Callable[[Training, int], None] | None
 ) -> None:
-    """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
+    """Train until the end or a signal; save a checkpoint now and then, and every better policy.
+
+    At the end, what is already saved of the last tick is not saved again: of large networks, that
+    takes as long as a tick.
+    """
     with _log_to_tensorboard(out / EVENTS, training) as show, _watch_for_signal() as stopped:
         # the last ticks without and with an evaluation
         saved = time.monotonic()
+        saved_tick = results_tick = -1
         took = [0.0, 0.0]
         while not training.done and not stopped():
             rows = len(training.curve)
@@ -229,13 +233,18 @@ def _run_training(
             if is_due:
                 save_training(out / CHECKPOINT, training)
                 saved = now
+                saved_tick = training.tick
             if len(training.curve) > rows:
                 show(training.curve[-1])
             if is_due or len(training.curve) > rows:
                 _save_results(out, training)
+                results_tick = training.tick
             if progress:
                 progress(training, 1)
-    save_training(out / CHECKPOINT, training)
+    if saved_tick != training.tick:
+        save_training(out / CHECKPOINT, training)
+    if results_tick != training.tick:
+        _save_results(out, training)
 
 
 def _is_evaluation_due(training: Training) -> bool:

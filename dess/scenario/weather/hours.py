@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.elementary import exp_of_each, log10
+from dess.base.elementary import cos, exp_of_each, log10, sin
 from dess.base.errors import InputError, listed
 from dess.base.files.reading import version_of
 from dess.physics.energy import ACTIONS, PERCENT, SPEEDS
@@ -31,7 +31,7 @@ from dess.scenario.weather.sun import is_light
 DAY = 24 * HOUR
 SHEAR = 0.11  # the exponent of the wind's growth with height, over open water
 _LN10 = 2.302585092994046
-_ROUNDING = 1e-9  # what rounding may add to an airspeed, as a share
+_ROUNDING = 1e-9  # what rounding may add to the square of an airspeed, as a share
 
 
 class State(IntEnum):
@@ -200,8 +200,10 @@ def _can_fly(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarra
     k is the larger of sine and cosine of the wind's direction. Slower ones then can as well.
     """
     speed = flight.cruise / min(flight.slots_per_cell)
-    airspeeds = airspeeds_of(speed, wind, origin)
-    return np.asarray((airspeeds <= flight.max_speed * (1 + _ROUNDING)).all(1))
+    angle = np.radians(origin)
+    along = np.maximum(np.abs(sin(angle)), np.abs(cos(angle)))
+    square = wind * wind + speed * speed + 2 * wind * speed * along
+    return np.asarray(square <= flight.max_speed * flight.max_speed * (1 + _ROUNDING))
 
 
 def _costs_of(flight: _Flight, wind: np.ndarray, origin: np.ndarray) -> np.ndarray:

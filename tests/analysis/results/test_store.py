@@ -261,3 +261,16 @@ def test_gaps_are_what_is_in_no_other_range(wanted, present):
     assert [r for gap in missing for r in gap] == [
         r for r in range(*sorted(wanted)) if r not in there
     ]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 100])
+def test_small_files_are_joined_into_those_of_any_size(size, tmp_path, monkeypatch):
+    """The files are those that a run with chunks of this size writes at once."""
+    fleets = {"kind": "grid", "values": {"uavs": [1, 2]}}
+    study = small_study(tmp_path, missions=5, policies=["greedy"], design=fleets)
+    for name, of_chunk in (("joined", 2), ("expected", size)):
+        monkeypatch.setitem(runner.CHUNK, "batch", of_chunk)
+        run_study(study, tmp_path / name)
+    with Store.open(study, tmp_path / "joined") as store:
+        store.merge([*split_into_chunks(store.manifest.parts_of_team(0, [5, 5]), size)])
+    assert files_of(tmp_path / "joined") == files_of(tmp_path / "expected")

@@ -68,6 +68,30 @@ def _at(tick: int, act: Callable[[], Any]) -> Progress:
     return progress
 
 
+@pytest.mark.parametrize("stops_at", [None, 7])
+def test_nothing_is_saved_twice_at_the_end(stops_at, tmp_path, monkeypatch):
+    """Where each tick is followed by a checkpoint, the last one is; also after a signal."""
+    monkeypatch.setattr(session, "CHECKPOINT_EVERY", -1.0)
+    ticks: dict[str, list[int]] = {"save_training": [], "_save_results": []}
+    for name in ticks:
+        save = getattr(session, name)
+
+        def counted(out, training, save=save, name=name):
+            ticks[name].append(training.tick)
+            save(out, training)
+
+        monkeypatch.setattr(session, name, counted)
+    progress = None
+    if stops_at:
+        progress = _at(stops_at, lambda: signal.raise_signal(signal.SIGINT))
+    training = train(SHORT, tmp_path / "out", progress=progress)
+    assert training.tick == (stops_at or 40)
+    assert ticks["save_training"] == [*range(training.tick + 1)]
+    assert ticks["_save_results"] == [*range(1, training.tick + 1)]
+    again = load_training(tmp_path / "out" / CHECKPOINT, SHORT, CPU)
+    assert_same(again, training)
+
+
 def test_the_folder_of_a_training(whole, tmp_path):
     seen: list[tuple[int, int]] = []
     out = tmp_path / "runs" / "tiny"

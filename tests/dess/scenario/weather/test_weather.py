@@ -141,7 +141,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"height": "10"}, "height: '10' has no unit"),
     ({"due": "0 h"}, "due: '0 h' is out of range"),
     ({"longitude": 200}, "longitude: 200 is out of range"),
-    ({"units": {"wind": "kg"}}, "wind: has the unit 'kg'; allowed: a speed"),
+    ({"units": {"wind": "kg"}}, "weather: units: wind: has the unit 'kg'; allowed: a speed"),
     ({"units": {"x": "kg"}}, "units.x: 'kg' is unknown"),
     ({"digest": "abc"}, "digest"),
     ({"stamps": "middle"}, "stamps: 'middle' is unknown; allowed: begin, end"),
