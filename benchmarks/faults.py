@@ -235,8 +235,8 @@ FAULTS = (
     Fault(
         "a UAV in a queue may leave it",
         MOVES,
-        "if charge and (u.pad_request >= 0 or (lands(mission) and parked)):",
-        "if charge and lands(mission) and parked:",
+        "return u.pad_request >= 0 or (lands(mission) and parked)",
+        "return lands(mission) and parked",
     ),
     Fault(
         "nobody stays in a zone shortly before the end",
