@@ -36,6 +36,7 @@ from dess.analysis.metrics import (
     columns_in_units,
     format_length,
     in_either,
+    limit_of,
     measured_in,
     metric_of,
 )
@@ -100,7 +101,10 @@ _MISSION = ["policy", "point", "replication"]
 
 @compute_once
 def missions_of(results: Results) -> pd.DataFrame:
-    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail."""
+    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail.
+
+    There, none can (``metrics.limit_of``), so that the other side cannot have less.
+    """
     uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
     sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
     missions = results.missions.join(sums, on=_MISSION)
@@ -112,8 +116,12 @@ def missions_of(results: Results) -> pd.DataFrame:
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
     if units:
-        return sides.assign(**columns_in_units(sides, units))
-    return sides
+        sides = sides.assign(**columns_in_units(sides, units))
+    limits: dict[str, np.ndarray] = {}
+    for name in fillable:
+        most = np.where(missions[name].isna(), 0.0, np.inf)
+        limits |= {limit_of(column): most for column in in_either(name) if column in sides}
+    return sides.assign(**limits)
 
 
 def measured_columns(results: Results) -> list[str]:

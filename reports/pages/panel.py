@@ -298,6 +298,12 @@ def _panel_of(
     given: Mapping[str, Any],
 ) -> Panel:
     """A panel of two scenarios without costs and requirements."""
+    if variation.failures.uav_rate and not baseline.failures.uav_rate:
+        # Without failures it does not matter how long a repair takes: then it does not differ.
+        repair = {"failures.uav_repair": variation.failures.uav_repair}
+        if repair["failures.uav_repair"] != baseline.failures.uav_repair:
+            baseline = ScenarioSpace.of(baseline, **repair)
+            given = {**dotted(dict(given)), **repair}
     name = scenario if is_scenario_name(scenario) else PurePath(scenario).name
     return Panel(
         scenario=name,

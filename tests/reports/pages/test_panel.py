@@ -35,6 +35,7 @@ from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import index, panel_settings
+from dess.reports.pages import panel as panels
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
 from dess.reports.pages.panel import PORTION, make_another, make_panel
@@ -156,11 +157,21 @@ def test_failures_of_a_sheet_are_a_setting_in_its_words():
 def test_where_one_sheet_has_no_failures_the_sides_differ_by_what_follows_from_the_other():
     sea = load_scenario("jade-bight")
     failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
-    settings = dict(panel_settings.settings_of(sea, failing))
+    panel = panels._panel_of(sea, failing, "jade-bight", ["greedy"], SEED, {})
+    baseline, variation = panel.spaces
+    settings = dict(panel_settings.settings_of(baseline, variation))
     assert not [key for key, values in settings.items() if values[0] == values[-1]]
-    sides = [panel_settings.value_of(failing, key) for key in settings]
+    sides = [panel_settings.value_of(variation, key) for key in settings]
     values = dict(zip(settings, sides, strict=True))
-    assert ScenarioSpace.of(sea, **values).failures == failing.failures
+    assert ScenarioSpace.of(baseline, **values).failures == failing.failures
+    repair = f"failures.uav_repair={failing.failures.uav_repair}"
+    assert repair in panel.render()  # commands set it on both sides
+    own, ours, theirs = (
+        simulate_batch(side, policies.load("greedy"), SEED, 60) for side in (sea, *panel.spaces)
+    )
+    assert ours.missions.tobytes() == own.missions.tobytes() != theirs.missions.tobytes()
+    assert ours.uavs.tobytes() == own.uavs.tobytes()
+    assert not ours.operations["failures"].any()
 
 
 def test_rates_of_nodes_are_told_as_shares_of_those_of_the_sheet():
