@@ -29,11 +29,8 @@ def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
     folders = [*studies, *beside]
     steps: list[Step] = [copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
     changes = [results_changes(f"{_RESULTS}/{one}") for one in folders]
-<<<<<<< HEAD
-=======
     if name in TIMED:  # the times of decisions, which are kept in the folder of the study
         changes.append(json_changes(f"{_RESULTS}/{TIMED[name]}/{DERIVED}"))
->>>>>>> main
     known = read_report(name).parameters
     parameters = {key: text for key, text in ready.ASKED_WITH.items() if key in known}
     if name in _ASKING:
