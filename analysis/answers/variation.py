@@ -20,6 +20,7 @@ from scipy.special import ndtri
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.missions import end_in_words, estimate_metric
+from dess.analysis.answers.policies import ranks
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
@@ -234,7 +235,7 @@ def product_differences(results: Results, policy: str) -> pd.Series:
 def best_policy_of_side(results: Results, point: int) -> str:
     """The policy with the highest mean product on one side."""
     missions = results.missions
-    return summary.best_policy(missions[missions["point"] == point])
+    return ranks.best_policy(missions[missions["point"] == point])
 
 
 def _missing_in_words(answer: Any) -> str:

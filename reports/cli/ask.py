@@ -207,7 +207,7 @@ def _ask_around(
 ) -> None:
     """Ask what one more UAV or pad brings to the cheapest fleet, and what the fleet bears."""
     from dess.analysis.ask.around import question_around
-    from dess.analysis.ask.limits import find_limits
+    from dess.analysis.ask.limit_search import find_limits
 
     scenario = question.study.scenario
     if question.study.selection and (changes := question_around(results, scenario)):
