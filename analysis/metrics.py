@@ -215,6 +215,7 @@ FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].defa
 
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
+WINDOWS = "windows"  # of a year with weather
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
@@ -315,6 +316,11 @@ _GROUPS["operations"] = (
     Metric("utilisation", "Utilisation of the pads", kind="share", is_neutral=True),
     Metric("failures", "Failures of UAVs", less_is_better=True, least=0.0, failure=1.0),
     _time_metric("slots_grounded", "Time under repair", is_sum=True),
+    # Of years with weather.
+    Metric("late", "Late data", kind="share", less_is_better=True, in_percent=True),
+    Metric("open", "Open hours", kind="share", is_neutral=True, in_percent=True),
+    _amount_metric(WINDOWS, "Windows a year", neutral=True),
+    _amount_metric("longest_gap", "Longest gap", "h", neutral=True),
 )
 # What records have in slots and data units; there is a metric of each in the units of a data sheet.
 _GROUPS["amounts"] = (
@@ -399,6 +405,16 @@ def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 
     return replace(metric, most=longest)
 
 
+def metric_of_years(metric: Metric) -> Metric:
+    """The same metric of years with weather, of which each has hundreds of missions.
+
+    An outcome is the share of its windows, and no rare year lies far from all others.
+    """
+    if metric.is_outcome:
+        metric = replace(metric, kind="share")
+    return replace(metric, fails=False, failure=0.0)
+
+
 def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
     """A table of missions without the columns that have a list for every mission."""
     return missions.drop(columns=[*NODES_BEHIND.values()], errors="ignore")
@@ -406,10 +422,12 @@ def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
 
 def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
     """The metric of a column of missions of a scenario space, with its range and its nodes."""
-    slots = space.max_slots
+    slots = space.longest_slots
     if metric_of(column).is_wait:
         slots = longest_wait(space)
     metric = metric_for_length(column, slots, space.units, space.uavs[1])
+    if space.weather.is_on:
+        metric = metric_of_years(metric)
     if column in NODES_BEHIND:
         return replace(metric, among=len(space.nodes))
     return metric
@@ -426,6 +444,8 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     metric = metric_of(column)
     if not len(missions):
         return metric
+    if WINDOWS in missions and not missions[WINDOWS].isna().all():
+        metric = metric_of_years(metric)
     nodes = NODES_BEHIND.get(column)
     if nodes in missions:
         metric = replace(metric, among=len(np.asarray(missions[nodes])[0]))
@@ -646,7 +666,7 @@ def longest_wait(space: ScenarioSpace) -> int:
     failures = space.failures
     may_fail = failures.pad_rate > 0 or any(failures.pad_rates)
     if may_fail or min(space.zone_pads) < space.uavs[1]:
-        return space.max_slots
+        return space.longest_slots
     return 0
 
 

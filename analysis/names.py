@@ -145,6 +145,7 @@ PARAMETERS = {field.key: field for field in _PAPER}
 DECISIONS = (
     *("uavs", "pads", "zone", "zones", ZONE_PADS, "forbid_swaps", "altitude"),
     *("flying_time", "charge_start", "charge_complete", "charge_rate"),
+    *("fleet", "data_sheet.cruise", "data_sheet.spares"),
 )
 
 

@@ -337,7 +337,7 @@ def settings_answer(
 def sweep(
     scenario: str | Path = "paper",
     policies: Iterable[str] | None = None,
-    missions: int = 300,
+    missions: int | None = None,
     seed: int = 0,
     folder: str | Path = "results",
     workers: int = 1,
@@ -345,6 +345,7 @@ def sweep(
     prices: Mapping[str, Any] | None = None,
     requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
+    years: int | None = None,
     progress: bool | Progress = True,
     yes: bool = False,
     **fields: Any,
@@ -359,8 +360,8 @@ def sweep(
         scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams to compare: ``"P"`` or ``"P,P,..."``. Without any, the best policy that
             five minutes allow, and ``greedy``.
-        missions: Number of missions of every setting. With requirements, the number of additional
-            missions that check each selected setting.
+        missions: Number of missions of every setting, 300 by default. With requirements, the
+            number of additional missions that check each selected setting.
         seed: Seed of the missions.
         folder: Results are stored in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
@@ -370,6 +371,7 @@ def sweep(
             requirements, as many missions are simulated as the search for the cheapest setting
             that meets them needs.
         name: Name of the sweep. Without one, it is made of the fields and a hash.
+        years: Years of weather, in place of missions; 10 by default where a scenario has weather.
         progress: Whether to show a progress bar, or a function that is called with the number of
             missions done since its last call.
         yes: Whether the sweep may take more than an hour.
@@ -383,7 +385,16 @@ def sweep(
     """
     values = {field: values_of(field, asked) for field, asked in fields.items()}
     question = sweep_question(
-        values, scenario, policies, missions, seed, prices, requirements, name, folder=folder
+        values,
+        scenario,
+        policies,
+        missions,
+        seed,
+        prices,
+        requirements,
+        name,
+        folder=folder,
+        years=years,
     )
     return settings_answer(_ask(question, workers, progress, yes), question)
 
@@ -393,13 +404,14 @@ def what_if(
     baseline: Mapping[str, Any] | None = None,
     scenario: str | Path = "paper",
     policies: Sequence[str] | None = None,
-    missions: int = 500,
+    missions: int | None = None,
     seed: int = 0,
     folder: str | Path = "results",
     workers: int = 1,
     *,
     prices: Mapping[str, Any] | None = None,
     shown: str | None = None,
+    years: int | None = None,
     progress: Progress | None = None,
     yes: bool = False,
 ) -> VariationAnswer:
@@ -415,12 +427,13 @@ def what_if(
         scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``. Without any, the best
             policy that five minutes allow, and ``greedy``.
-        missions: Number of missions of each policy on each side, at least 2.
+        missions: Number of missions of each policy on each side, at least 2; 500 by default.
         seed: Seed of the missions.
         folder: Folder in which results are stored.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
         prices: Prices, as for ``sweep``: then costs are compared as well.
         shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
+        years: Years of weather, in place of missions; 10 by default where a scenario has weather.
         progress: Called with the number of missions done since its last call.
         yes: Whether the question may take more than an hour.
 
@@ -429,7 +442,15 @@ def what_if(
             or not allowed, a policy cannot act in the scenario, or the question would take long.
     """
     question = what_if_question(
-        settings, baseline, scenario, policies, missions, seed, folder, prices=prices
+        settings,
+        baseline,
+        scenario,
+        policies,
+        missions,
+        seed,
+        folder,
+        prices=prices,
+        years=years,
     )
     check_shown(question, shown)
     return VariationAnswer(_ask(question, workers, progress, yes), question, shown)

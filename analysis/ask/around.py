@@ -75,7 +75,9 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
         changes.append(change)
     varied = {*values, *(field for change in changes for field in change)}
     start = {field: value for field, value in (fixed | values).items() if field in varied}
-    data = manifest.study.model_dump(mode="json", exclude_none=True, exclude={"selection"})
+    data = manifest.study.model_dump(
+        mode="json", exclude_none=True, exclude={"selection", "missions"}
+    )
     data |= {
         "name": _place_of_question(results).name,
         "scenario": scenario,
@@ -83,8 +85,9 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
         "set": {field: value for field, value in fixed.items() if field not in varied},
         "design": {"kind": "table", "rows": [start, *(start | change for change in changes)]},
         "policies": [best.policy],
-        "missions": missions,
     }
+    if not manifest.study.years:
+        data["missions"] = missions
     return Question(study_from(data, "question"), _place_of_question(results))
 
 
@@ -117,6 +120,8 @@ def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     """What is changed, one after the other."""
     yield {"uavs": space.uavs[1] + 1}
     yield {"pads": space.zone_pads[0] + 1}
+    if space.weather.is_on:
+        yield {"data_sheet.spares": space.data_sheet.spares + 1}
 
 
 def table_around(results: Results) -> Table:
@@ -225,4 +230,6 @@ def change_in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
     if field == "pads":
         return pads_in_words(len(space.zone_pads), 1, value)
+    if field == "data_sheet.spares":
+        return numbers.format_count(value, "spare UAV")
     return field_named(field).words(value)

@@ -42,7 +42,7 @@ from dess.analysis.sheet import scenario_notes
 from dess.analysis.study.cheapest import Cheapest, Required
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
 from dess.analysis.study.prices import Costs
-from dess.analysis.study.study import Study, study_from
+from dess.analysis.study.study import Study, replications_of, study_from
 from dess.base.commands import command_line
 from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in
@@ -52,6 +52,8 @@ from dess.scenario.fields import dotted, fields_of
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
 
 WHAT_IF = "what-if"
+# Missions of every setting of a sweep, and of every side of a what-if question.
+MISSIONS, MISSIONS_OF_SIDES = 300, 500
 _LENGTHS = {"initial_data": 2, "zone": 4}  # of fields whose value is a list of numbers
 LONGEST = 60  # largest number of characters for the fields in a name
 
@@ -167,13 +169,18 @@ class Question:
             fixed = {field: (value,) for field, value in study.set.items()}
             options = {"set": _values_as_options(fixed | design.values)}
             options["policy"] = ",".join(study.policies)
-        options |= {"missions": study.missions, "seed": study.seed}
+        replications = {"missions": study.missions}
+        if study.years:
+            replications = {"years": study.years}
+        options |= replications | {"seed": study.seed}
         if study.scenario != "paper":
             options["scenario"] = Path(study.scenario).name
         if study.costs:
             options["price"] = study.costs.model_dump(exclude_unset=True)
         if isinstance(rule, Cheapest):
-            options |= {"missions": rule.check, "require": rule.requirements}
+            options["require"] = rule.requirements
+            if not study.years:
+                options["missions"] = rule.check
         return command_line(asked, **options)
 
 
@@ -187,7 +194,11 @@ def _question_key(study: Study) -> str:
 
     So the same question with more missions adds to the same results folder.
     """
-    data = study.model_dump(mode="json", exclude={"missions": True, "selection": {"check"}})
+    of_selection = {"check"}
+    if study.years:
+        of_selection |= {"first", "budget"}
+    of_number: Any = {"missions": True, "years": True, "selection": of_selection}
+    data = study.model_dump(mode="json", exclude=of_number)
     about = {
         "version": dess.__version__,
         "engine": engine_code(),
@@ -205,13 +216,14 @@ def sweep_question(
     values: Mapping[str, Sequence[Any]],
     scenario: str | Path = "paper",
     policies: Iterable[str] | None = None,
-    missions: int = 300,
+    missions: int | None = None,
     seed: int = 0,
     prices: Mapping[str, Any] | None = None,
     requirements: Mapping[str, float | str] | None = None,
     name: str | None = None,
     *,
     folder: str | Path = "results",
+    years: int | None = None,
 ) -> Question:
     """Which combination of values is the best, or the cheapest that meets requirements?
 
@@ -223,6 +235,8 @@ def sweep_question(
     """
     _check_prices(prices)
     space = load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
+    replications = replications_of(space, missions, years, MISSIONS)
+    asked = replications.get("missions", MISSIONS)
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     fixed: dict[str, Any] = {field: values[field][0] for field in values if field not in swept}
     if AGE in (requirements or ()):
@@ -243,12 +257,16 @@ def sweep_question(
     }
     if prices:
         data["costs"] = dict(prices)
-    if requirements:
-        study = _validated_study(data, "sweep", policies, max(ROOM, missions))
-        rule = _cheapest_rule(requirements, missions, study)
+    if requirements and space.weather.is_on:
+        study = _validated_study(data | replications, "sweep", policies, 1)
+        rule = _cheapest_rule(requirements, 0, study).of_years(study.first, study.size)
+        study = study.model_copy(update={"selection": rule})
+    elif requirements:
+        study = _validated_study(data, "sweep", policies, max(ROOM, asked))
+        rule = _cheapest_rule(requirements, asked, study)
         study = study.model_copy(update={"selection": rule})
     else:
-        study = _validated_study(data | {"missions": missions}, "sweep", policies, missions)
+        study = _validated_study(data | replications, "sweep", policies, asked)
     if name is None:
         name = f"{'-'.join(swept)[:LONGEST] or 'sweep'}-{_question_key(study)}"
         study = study.model_copy(update={"name": name})
@@ -324,11 +342,12 @@ def what_if_question(
     baseline: Mapping[str, Any] | None = None,
     scenario: str | Path = "paper",
     policies: Sequence[str] | None = None,
-    missions: int = 500,
+    missions: int | None = None,
     seed: int = 0,
     folder: str | Path = "results",
     *,
     prices: Mapping[str, Any] | None = None,
+    years: int | None = None,
 ) -> Question:
     """What if the baseline had these settings? The arguments are those of ``analysis.what_if``.
 
@@ -349,11 +368,12 @@ def what_if_question(
     if changed.keys() - measuring:  # what changes is something else, which both sides measure
         fixed |= {field: changed.pop(field) for field in sorted(measuring)}
     fixed = _fields_to_measure(fixed | changed) | fixed
-    _check_changes(
-        load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed
-    )
-    if isinstance(missions, int) and missions < 2:
-        raise InputError("missions", f"{missions} is too few", "2 or more")
+    base = load_scenario(scenario, **fixed)
+    _check_changes(base, load_scenario(scenario, **fixed | changed), changed)
+    replications = replications_of(base, missions, years, MISSIONS_OF_SIDES)
+    for name, number in replications.items():
+        if isinstance(number, int) and number < 2:
+            raise InputError(name, f"{number} is too few", "2 or more")
     before = {field: fixed[field] for field in changed if field in fixed}
     data = {
         "name": WHAT_IF,
@@ -361,12 +381,13 @@ def what_if_question(
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
-        "missions": missions,
+        **replications,
         "seed": seed,
     }
     if prices:
         data["costs"] = dict(prices)
-    study = _validated_study(data, "question", policies, missions)
+    asked = replications.get("missions", 1)
+    study = _validated_study(data, "question", policies, asked)
     return Question(study, Path(folder) / WHAT_IF / _question_key(study))
 
 

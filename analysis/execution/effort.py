@@ -53,8 +53,9 @@ def policies_for(spaces: Iterable[ScenarioSpace], missions: int) -> tuple[str, .
 
 def estimate_decisions(space: ScenarioSpace) -> float:
     """About the decisions of a mission: every UAV flies until its quota is filled."""
-    needed = ceil(space.quota / space.communication_slots) or space.max_slots
-    slots = min(needed, space.max_slots)
+    longest = space.longest_slots
+    needed = ceil(space.quota / space.communication_slots) or longest
+    slots = min(needed, longest)
     return sum(space.uavs) / 2 * slots
 
 
@@ -344,7 +345,7 @@ def _check_policies(study: Study) -> None:
     first, *others = places.values()
     by_size = sorted(others, key=lambda space: len(space.nodes) * math.prod(space.size))
     for number, space in enumerate([first, *by_size[-1:]]):
-        first_slot = space.model_copy(update={"max_slots": 1})
+        first_slot = space.without_weather().model_copy(update={"max_slots": 1})
         for team in teams:
             with _failures_left_to_the_run():
                 about = (study.engine, [first_slot], team, study.seed, [number])

@@ -25,6 +25,7 @@ from dess.analysis.execution.workers import Here, Pool
 from dess.analysis.metrics import (
     METRICS,
     NODES_BEHIND,
+    WINDOWS,
     columns_in_units,
     measured_in,
     metric_in_space,
@@ -40,13 +41,20 @@ from dess.analysis.stats.weights import moments_of_space
 from dess.analysis.stats.worst_node import moments_of_worst_node
 from dess.base.errors import check_type
 from dess.model.processes import load_processes
-from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.model.record import (
+    AGES_OF_MONTHS,
+    MISSION_RECORD,
+    NODE_RECORD,
+    OPERATIONS,
+    UAV_RECORD,
+    YEAR_OPERATIONS,
+    Records,
+)
 from dess.model.state import check_seed, spaces_of
 from dess.model.view import check_team
 from dess.physics.streams import MAX_REPLICATION
 from dess.policies.registry import Policy, load_team
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
-from dess.scenario.weather import refuse_weather
 
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
@@ -180,7 +188,7 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
     for records, took in _simulate_pieces(asked, pieces, progress):
         _add_to_moments(moments, _metric_values(records, asked.scenario), records.missions["uavs"])
         if asked.missions <= MOST_COMPARED:
-            values.append(pd.DataFrame(records.missions[_COMPARED]))
+            values.append(_compared_columns(records))
         uav_slots += int(records.missions["uav_slots"].sum())
         seconds += took
     kept = None
@@ -191,12 +199,21 @@ def _evaluate_in_parts(asked: Asked, size: int, progress: Progress | None) -> Ev
     return Evaluation(asked.team, over_space, uav_slots, seconds, kept, compared)
 
 
+def _compared_columns(records: Records) -> pd.DataFrame:
+    """What policies are compared by, and of years with weather the windows, which tell them."""
+    columns = pd.DataFrame(records.missions[_COMPARED])
+    if WINDOWS in (records.operations.dtype.names or ()):
+        columns[WINDOWS] = records.operations[WINDOWS]
+    return columns
+
+
 def of_results(results: Results) -> list[Evaluation]:
     """The evaluations of the teams of a study that has the scenario as its only design point."""
     evaluations = []
     for team, rows in results.missions.groupby("policy", sort=False):
         metrics: dict[Key, np.ndarray] = {n: rows[n].to_numpy(float) for n in recorded_metrics()}
-        measured = [name for name in OPERATIONS.names or () if name in rows]
+        names = [name for name in YEAR_OPERATIONS.names or () if name not in AGES_OF_MONTHS]
+        measured = [name for name in names if name in rows]
         for name in (*measured, *measured_in(rows)):  # as they are measured, then in units
             if name not in NODES_BEHIND:
                 metrics[name] = rows[name].to_numpy(float)
@@ -204,7 +221,8 @@ def of_results(results: Results) -> list[Evaluation]:
         _add_to_moments(moments, metrics | _values_by_node(rows), rows["uavs"].to_numpy())
         over_space = _over_space(moments, results.scenario(), len(rows))
         uav_slots = int(rows["uav_slots"].sum())
-        evaluation = Evaluation(str(team), over_space, uav_slots, nan, compared=rows[_COMPARED])
+        columns = [*_COMPARED, *(name for name in [WINDOWS] if name in rows)]
+        evaluation = Evaluation(str(team), over_space, uav_slots, nan, compared=rows[columns])
         evaluations.append(evaluation)
     return evaluations
 
@@ -256,7 +274,9 @@ def _metric_values(records: Records, space: ScenarioSpace) -> dict[Key, np.ndarr
     """The values of every metric that some of the missions have measured, in units as well."""
     values = {metric: records.missions[metric] for metric in recorded_metrics()}
     if len(records.operations):
-        values |= {name: records.operations[name] for name in OPERATIONS.names or ()}
+        names = records.operations.dtype.names or ()
+        measured = [name for name in names if name not in AGES_OF_MONTHS]
+        values |= {name: records.operations[name] for name in measured}
     if space.units:
         values |= columns_in_units(values, space.units)
     metrics: dict[Key, np.ndarray] = {m: column.astype(float) for m, column in values.items()}
@@ -325,9 +345,8 @@ def _simulate_pieces(
     policies = asked.load_policies()
     pool = Here(asked.workers)
     about = (asked.scenario, policies, asked.seed)
-    refuse_weather([asked.scenario.weather])
     if asked.engine == "batch":
-        simulate_batch(*about, 1)  # compiles
+        simulate_batch(about[0].without_weather(), *about[1:], 1)  # compiles
     else:
         first = _event_jobs(asked, range(1))
         _results_in_order(

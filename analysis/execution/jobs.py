@@ -27,7 +27,6 @@ from dess.model.processes import load_processes
 from dess.model.record import Records, empty_records_of
 from dess.policies.registry import load_team
 from dess.scenario.scenario import ScenarioSpace
-from dess.scenario.weather import refuse_weather
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
 # interrupted.
@@ -57,7 +56,6 @@ def simulate_missions(
     Raises:
         InputError: If the batch engine cannot simulate one of the scenarios.
     """
-    refuse_weather(space.weather for space in spaces)
     if engine == "batch":
         fleet = max(space.uavs[1] for space in spaces)
         return simulate_batch(spaces, team[:fleet], seed, replications, progress=progress)

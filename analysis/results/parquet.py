@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 from pydantic import Field, TypeAdapter
 
 from dess.analysis.bound import Bound
-from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS
+from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS, WINDOWS
 from dess.analysis.results.chunks import Chunk, name_of, short_hash
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT, parquet_of
@@ -31,6 +31,8 @@ from dess.model.record import (
     MISSION_RECORD,
     OPERATIONS,
     UAV_RECORD,
+    YEAR_OPERATIONS,
+    YEAR_RECORD,
     Records,
     node_ratios,
     nodes_of,
@@ -46,7 +48,7 @@ Columns = Mapping[str, Any]  # the values of every column of a table
 Number = Annotated[int, Field(ge=0, le=MAX_REPLICATION + 1)]
 Row = tuple[str, Number, Number]  # the key of a cell, with the start and stop of its replications
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
-MEASURED = OPERATIONS.names or ()  # nan where a mission lacks it
+MEASURED = YEAR_OPERATIONS.names or ()  # nan where a mission lacks it
 # The columns of words, and the words.
 WORDS = {"end": END_NAMES, "event": EVENT_NAMES}
 
@@ -64,6 +66,15 @@ EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_record_columns(OPERATIONS)])
 NODES = (NODE_RATIOS, NODE_AGES)
 SHEET_MISSIONS = pa.schema(
     [*EXTENDED_MISSIONS, *((name, pa.list_(pa.float64())) for name in NODES)]
+)
+# Of years with weather.
+YEARS = pa.schema(
+    [
+        ("cell", KEY),
+        *_record_columns(YEAR_RECORD),
+        *_record_columns(YEAR_OPERATIONS),
+        *((name, pa.list_(pa.float64())) for name in NODES),
+    ]
 )
 UAVS = pa.schema(
     [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_record_columns(UAV_RECORD)]
@@ -104,7 +115,7 @@ def _with_earlier(schema: pa.Schema, added: Iterable[Sequence[str]]) -> list[pa.
 _OF_MISSIONS = (_with_earlier(kind, _ADDED_TO_MISSIONS) for kind in (MISSIONS, EXTENDED_MISSIONS))
 # The schemas that files may have.
 SCHEMAS = {
-    "missions": [SHEET_MISSIONS, *chain(*zip(*_OF_MISSIONS, strict=True))],
+    "missions": [SHEET_MISSIONS, YEARS, *chain(*zip(*_OF_MISSIONS, strict=True))],
     "uavs": _with_earlier(UAVS, _ADDED_TO_UAVS),
     "bounds": [BOUNDS],
     "events": _with_earlier(EVENTS, _ADDED_TO_EVENTS),
@@ -129,7 +140,7 @@ def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
     cells = _cell_columns(chunk)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     if len(records.operations):
-        missions |= {n: records.operations[n] for n in OPERATIONS.names or ()}
+        missions |= {n: records.operations[n] for n in records.operations.dtype.names or ()}
     if len(records.nodes):
         missions |= columns_of_nodes(records)
     present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
@@ -158,7 +169,9 @@ def tables_with(
 ) -> list[pa.Table]:
     """The tables of a chunk from their columns, such as those of ``rows_of``."""
     is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
-    if all(name in missions for name in NODES):
+    if WINDOWS in missions:
+        schema = YEARS
+    elif all(name in missions for name in NODES):
         schema = SHEET_MISSIONS
     elif is_extended:
         schema = EXTENDED_MISSIONS

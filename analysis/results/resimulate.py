@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from dess import InputError, simulate
+from dess import InputError, simulate, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.metrics import HOME, NODE_AGES, NODE_RATIOS, format_length, without_nodes
 from dess.analysis.results.event_log import causes_of_failure
@@ -24,8 +24,8 @@ from dess.base.files.tables import LIMIT
 from dess.model.mission import Process
 from dess.model.record import (
     MISSION_RECORD,
-    OPERATIONS,
     UAV_RECORD,
+    YEAR_OPERATIONS,
     MissionRecord,
     node_ratios,
 )
@@ -127,6 +127,19 @@ def mission_of(
     return LoggedMission(",".join(names), scenario, record, _uavs_of(record), events)
 
 
+def record_of(
+    space: ScenarioSpace,
+    team: Sequence[Policy],
+    seed: int,
+    replication: int,
+    processes: Sequence[Process] = (),
+) -> MissionRecord:
+    """Simulate a replication again: a mission with the SimPy engine, a year with the other one."""
+    if space.weather.is_on:
+        return simulate_batch(space, [*team], seed, [replication]).mission(0)
+    return simulate(space, team, seed, replication, processes=processes)
+
+
 def resimulate(results: Results, policy: str, point: int, replication: int) -> LoggedMission:
     """Simulate a mission of a study again, with the SimPy engine.
 
@@ -165,7 +178,7 @@ def stored_record(results: Results, policy: str, point: int, replication: int) -
     )
     if missions or checks:
         row = (missions or checks)[0]
-        measured = (n for n in OPERATIONS.names or () if n in row and not isnan(row[n]))
+        measured = (n for n in YEAR_OPERATIONS.names or () if n in row and not isnan(row[n]))
         return _by_field(row, uavs) | {name: row[name] for name in measured} | _hash_of_nodes(row)
     raise InputError(
         results.store.folder,

@@ -470,7 +470,7 @@ class Store:
         missions = _with_worst_nodes(self._rows("missions", parts))
         spaces = self.manifest.scenarios
         points = missions["point"].to_numpy()
-        missions[MOST_SLOTS] = np.array([space.max_slots for space in spaces])[points]
+        missions[MOST_SLOTS] = np.array([space.longest_slots for space in spaces])[points]
         missions[MOST_WAITING] = np.array([longest_wait(space) for space in spaces])[points]
         if costs := self.manifest.study.costs:
             cost = costs.parts(spaces, missions, self.uavs(parts))

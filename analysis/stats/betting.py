@@ -13,6 +13,7 @@ error of 5 %, it takes 318 of them, and the stakes of a sequence 435.
 """
 
 import numpy as np
+from scipy.special import stdtrit
 
 from dess.analysis.stats.verdict import Verdict, judge_facts
 from dess.base.kernels import kernel
@@ -113,6 +114,37 @@ class MeanTest:
         if first < len(shares):
             margin = self._total / self.missions - self.required
             self.verdict = judge_facts(kept == first, broken == first, margin)
+
+
+class TestOfYears:
+    """A test of whether a mean meets a requirement, by all values at once.
+
+    There are far too few years for bets. So the interval is Student's, which holds once: for
+    values that are observed in one part. Of the (n, K) values of nodes, the worst one counts.
+
+    Attributes:
+        required, verdict, missions: As of a ``MeanTest``.
+    """
+
+    def __init__(self, required: float, tolerance: float, error: float):
+        self.required = required
+        self.verdict = Verdict.OPEN
+        self.missions = 0
+        self._limits = tolerance, error
+
+    def observe(self, values: np.ndarray) -> None:
+        """Take all values into account, in the order of their replications."""
+        if self.missions or len(values) < 2:
+            return
+        self.missions = len(values)
+        by_node = values.reshape(len(values), -1)
+        tolerance, error = self._limits
+        means, deviations = by_node.mean(axis=0), by_node.std(axis=0, ddof=1)
+        one_sided = [1 - error, 1 - error / by_node.shape[1]]
+        below, above = stdtrit(len(values) - 1, one_sided) / np.sqrt(len(values))
+        is_met = bool((means - below * deviations > self.required - tolerance).all())
+        is_missed = bool((means + above * deviations < self.required + tolerance).any())
+        self.verdict = judge_facts(is_met, is_missed, float(means.min()) - self.required)
 
 
 class WorstNodeTest:

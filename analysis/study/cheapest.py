@@ -22,7 +22,7 @@ from dess.analysis.metrics import (
     size_of,
 )
 from dess.analysis.names import DECISIONS
-from dess.analysis.stats.betting import MeanTest, WorstNodeTest
+from dess.analysis.stats.betting import MeanTest, TestOfYears, WorstNodeTest
 from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
@@ -174,24 +174,32 @@ class Setting(NamedTuple):
     Attributes:
         values: The fields that the design sets.
         loss: The cost over all missions if every mission lost all UAVs, in the currency.
-        horizon: The largest age that data can have [h with a data sheet, otherwise slots].
+        horizon: What tolerances of ages are shares of (``horizon_of``).
         currency: What costs are in: a currency, or a currency a year.
+        is_of_years: Whether its replications are years with weather.
     """
 
     values: Mapping[str, Any]
     loss: float
     horizon: float = 1.0
     currency: str = Costs.model_fields["currency"].default
+    is_of_years: bool = False
 
     @classmethod
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
         loss = costs.loss_of_fleets(space)
-        return cls(values, loss, horizon_of(space), costs.unit)
+        return cls(values, loss, horizon_of(space), costs.unit, space.weather.is_on)
 
 
 def horizon_of(space: ScenarioSpace) -> float:
-    """The largest age that data can have [h with a data sheet, otherwise slots]."""
+    """What tolerances of ages are shares of: the length of a mission, or a day in years.
+
+    Returns:
+        It is in hours with a data sheet, otherwise in slots.
+    """
+    if space.weather.is_on:
+        return 24.0
     return space.max_slots * (size_of("h", space.units) if space.units else 1)
 
 
@@ -328,6 +336,10 @@ class Cheapest(StrictTable):
         horizon = horizon_of(space)
         share = self.amount(metric) / horizon
         has_unit = isinstance(required, str)
+        if space.weather.is_on:
+            if not has_unit or share <= self.tolerance:
+                raise InputError(where, f"{shown(required)} does not fit", 'a time such as "6 h"')
+            return
         if not self.tolerance < share < 1 - self.tolerance or has_unit != bool(space.units):
             if space.units:
                 allowed = f'a time such as "6 h" in the horizon of {horizon:g} h'
@@ -371,6 +383,10 @@ class Cheapest(StrictTable):
             verdicts=tuple(search.points.verdicts),
             enough=self._enough(search),
         )
+
+    def of_years(self, years: int, points: int) -> Self:
+        """The rule where every one of so many points has all of so many years at once."""
+        return self.model_copy(update={"first": years, "budget": years * points, "check": 0})
 
     def shown(self, policies: int = 1) -> float:
         """The confidence that what was found to meet the requirements does, over all policies."""
@@ -438,7 +454,13 @@ AnySelection = Annotated[
 ]
 
 
-_KIND_OF_TEST: dict[str, type[WorstNodeTest]] = dict.fromkeys(_OF_NODES, WorstNodeTest)
+def _kind_of_test(metric: str, setting: Setting) -> type[MeanTest | WorstNodeTest | TestOfYears]:
+    """How a requirement of a setting is tested."""
+    if setting.is_of_years:
+        return TestOfYears
+    if metric in _OF_NODES:
+        return WorstNodeTest
+    return MeanTest
 
 
 def _column_of(metric: str, sample: Mapping[str, np.ndarray]) -> str:
@@ -495,7 +517,7 @@ class _Search:
         error_of_test = self._error / (len(samples) * len(rule.requirements))
         self._tests = [
             {
-                m: _KIND_OF_TEST.get(m, MeanTest)(
+                m: _kind_of_test(m, s)(
                     as_share(m, rule.amount(m), s.horizon), rule.tolerance, error_of_test
                 )
                 for m in rule.requirements

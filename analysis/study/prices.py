@@ -101,8 +101,6 @@ class Costs(StrictTable):
                 self._refuse_if_given(field, "is given without years", "with years")
         else:
             self._refuse_if_given("missions", "is given beside years", "days instead")
-            if self.days is None:
-                raise InputError("days", "is missing", "with years, the missions of a year: 1..365")
         return self
 
     def _refuse_if_given(self, field: str, problem: str, allowed: str) -> None:
@@ -110,11 +108,17 @@ class Costs(StrictTable):
             raise InputError(field, problem, allowed)
 
     def check(self, spaces: Sequence[ScenarioSpace]) -> None:
-        """Check that the length of a slot is known where hours have a price.
+        """Check that the length of a slot and the missions of a year are known where they are paid.
 
         Raises:
-            InputError: If it is not, or is given although it follows from a data sheet.
+            InputError: If one is not, or is given although it follows from a data sheet or weather.
         """
+        if any(space.weather.is_on for space in spaces):
+            if self.days is not None:
+                raise InputError("costs: days", "follows from the weather", "without this field")
+        elif self.years is not None and self.days is None:
+            allowed = "with years, the missions of a year: 1..365"
+            raise InputError("costs: days", "is missing", allowed)
         follows = any(space.units for space in spaces)
         where = "costs.slot_seconds"
         if follows and self.slot_seconds is not None:
@@ -196,10 +200,15 @@ class Costs(StrictTable):
         return amounts
 
     def price_of_uavs(self, space: ScenarioSpace, uavs: int) -> float:
-        """What the first UAVs of a scenario cost; the price of a type replaces ``uav``."""
+        """What the first UAVs of a scenario and its spares cost.
+
+        The price of a type replaces ``uav``; a spare costs as much as the dearest UAV.
+        """
+        spares = space.data_sheet.spares
         if not has_priced_types(space):
-            return self.uav * uavs
-        return sum(self.prices_of_uavs(space, uavs))
+            return self.uav * (uavs + spares)
+        prices = self.prices_of_uavs(space, uavs)
+        return sum(prices) + spares * max(prices, default=self.uav)
 
     def prices_of_uavs(self, space: ScenarioSpace, uavs: int) -> list[float]:
         """What each of the first UAVs of a scenario costs."""
@@ -258,7 +267,7 @@ class Costs(StrictTable):
             missions: (n,) columns of the missions: ``point`` and ``uavs``.
         """
         points = np.asarray(missions["point"])
-        slots = np.array([space.max_slots for space in spaces])
+        slots = np.array([space.longest_slots for space in spaces])
         hours = slots * [self.seconds_per_slot(space) / 3600 for space in spaces]
         spent = slots * [most_battery_per_slot(space) for space in spaces]
         smallest_packs = [min(full_packs_of(space, space.uavs[1])) for space in spaces]
@@ -327,7 +336,7 @@ class Costs(StrictTable):
         """(n,) what the UAVs of every mission cost together."""
         prices = self.uav * fleet
         for point, space in enumerate(spaces):
-            if has_priced_types(space):
+            if has_priced_types(space) or space.data_sheet.spares:
                 totals = [self.price_of_uavs(space, uavs) for uavs in range(space.uavs[1] + 1)]
                 at_point = points == point
                 prices[at_point] = np.array(totals)[fleet[at_point]]

@@ -12,9 +12,11 @@ from pydantic import (
     BeforeValidator,
     Field,
     PrivateAttr,
+    SerializerFunctionWrapHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -42,10 +44,11 @@ from dess.model.batch import check_slotted
 from dess.physics.section import Integer, plain, tuples
 from dess.physics.streams import MAX_SEED
 from dess.policies.registry import list_teams, load_team
-from dess.scenario.fields import dotted, merged
+from dess.scenario.fields import dotted
 from dess.scenario.scenario import (
     SEA,
     ScenarioSpace,
+    changed,
     is_scenario_name,
     load_scenario,
     scenario_at,
@@ -82,6 +85,8 @@ def engine_of(
 
 _STUDIES = Shipped("study", "dess.analysis.study", "shipped")
 
+# Years with weather that are simulated, if nothing else is asked for, and at most.
+YEARS, MOST_YEARS = 10, 1000
 # The longest name of a study, which is part of the names of files.
 MOST_CHARACTERS = 100
 
@@ -131,6 +136,13 @@ class StudyData(StrictTable):
         le=MOST_MISSIONS,
         description="per design point and policy; with a rule, not given",
     )
+    years: Integer | None = Field(
+        None,
+        ge=1,
+        le=MOST_YEARS,
+        description="years of weather per design point and policy, in place of missions; "
+        f"{YEARS} where a scenario has weather",
+    )
     precision: Precision | None = Field(
         None, description="a rule that asks for as many missions as narrow intervals take"
     )
@@ -152,6 +164,14 @@ class StudyData(StrictTable):
         False, strict=True, description="whether every mission has an upper bound, for the gap"
     )
 
+    @model_serializer(mode="wrap")
+    def _without_years(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave the years out where there are none: such studies are stored as before."""
+        values = handler(self)
+        if self.years is None:
+            values.pop("years", None)
+        return values
+
     @property
     def rule(self) -> Precision | AnySelection | None:
         """The rule that decides the number of replications; None if the number is fixed."""
@@ -160,6 +180,8 @@ class StudyData(StrictTable):
     @property
     def first(self) -> int:
         """The number of replications of every cell, before a rule asks for more."""
+        if self.years:
+            return self.years
         if self.rule:
             return self.rule.first
         return self.missions
@@ -167,6 +189,8 @@ class StudyData(StrictTable):
     @property
     def most(self) -> int:
         """The largest number of replications of a cell that a rule may ask for."""
+        if self.years:
+            return self.years
         if self.rule:
             return self.rule.budget
         return self.missions
@@ -229,6 +253,7 @@ class Study(StudyData):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
+        self._count_years()
         self._check_rule()
         self._check_points()
         self._check_metrics()
@@ -266,6 +291,31 @@ class Study(StudyData):
         # The model is frozen, and this is a part of its making.
         engine = engine_of(self.scenarios, asked, self.processes)
         object.__setattr__(self, "engine", engine)
+
+    def _count_years(self) -> None:
+        """Count replications in years where scenarios have weather: a selection has all of them."""
+        has_weather = {space.weather.is_on for space in self.scenarios}
+        if has_weather != {True}:
+            if len(has_weather) > 1:
+                raise InputError("design", "only some design points have weather", "all, or none")
+            if self.years is not None:
+                raise InputError("years", "are of scenarios with weather", "missions")
+            return
+        for name in ("missions", "precision"):
+            if name in self.model_fields_set:
+                raise InputError(name, "with weather, replications are years", "years")
+        if self.bounds or self.logged:
+            name = "bounds" if self.bounds else "logged"
+            raise InputError(name, "are of single missions", "without them, with weather")
+        years = self.years or YEARS
+        object.__setattr__(self, "years", years)
+        if self.selection and years < 2:
+            raise InputError("years", f"{years} is too few", "2 or more, for a selection")
+        if isinstance(self.selection, Selection):
+            raise InputError("selection", "needs missions", "procedure = cheapest, with weather")
+        if self.selection:
+            rule = self.selection.of_years(years, self.size)
+            object.__setattr__(self, "selection", rule)
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:
@@ -405,12 +455,30 @@ def change_scenario(scenario: str, values: str) -> ScenarioSpace:
     Raises:
         InputError: If it is not valid.
     """
-    return validated(ScenarioSpace, merged(json.loads(scenario), json.loads(values)), "scenario")
+    fields = changed(json.loads(scenario), json.loads(values), "scenario")
+    return validated(ScenarioSpace, fields, "scenario")
 
 
 def _may_run_files(context: dict[str, Any] | None) -> bool:
     """Whether what validates a study says that Python files may be run."""
     return bool(context and context["run_files"])
+
+
+def replications_of(
+    space: ScenarioSpace, missions: int | None, years: int | None, default: int
+) -> dict[str, int]:
+    """The field of a study that tells its replications: missions, or years with weather.
+
+    Raises:
+        InputError: If the other one is given.
+    """
+    if space.weather.is_on:
+        if missions is not None:
+            raise InputError("missions", "are years, with weather", "years")
+        return {"years": YEARS if years is None else years}
+    if years is not None:
+        raise InputError("years", "are of a scenario with weather", "missions")
+    return {"missions": default if missions is None else missions}
 
 
 def study_from(

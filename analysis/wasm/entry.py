@@ -41,6 +41,7 @@ from dess.physics.landing import is_over
 from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
 
 _F8, _I8, _I4, _I2, _I1 = np.float64, np.int64, np.int32, np.int16, np.int8
+_B1 = np.bool_
 # The metrics of missions, in the order of the columns of ``values``: those of each mission, what
 # extended scenarios measure (nan where one does not), and the cost (nan without prices).
 METRICS = (
@@ -73,6 +74,8 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "types": (UAV, 2),
     "data": (_F8, 3),
     "rates": (_F8, 2),
+    "ages": (_F8, 2),
+    "silent": (_B1, 2),
     "nodes": (_I8, 2),  # of ``World``
     "mean_snr": (_F8, 2),
     "order": (_I2, 2),
@@ -169,6 +172,8 @@ def _starts(table):
         _array2(table, _AT.types, _UAV),
         _array3(table, _AT.data, _F8),
         _array2(table, _AT.rates, _F8),
+        _array2(table, _AT.ages, _F8),
+        _array2(table, _AT.silent, _B1),
     )
 
 

@@ -237,6 +237,8 @@ def _arrays_of(
         "types": types_of(space, fleet)[None],
         "data": starts.data,
         "rates": starts.rates,
+        "ages": starts.ages,
+        "silent": starts.silent,
         **{name: getattr(world, name) for name in ("nodes", "mean_snr", "order", "means")},
         **{name: getattr(chart, name) for name in ("zones", "parking", "sizes", "nearest")},
         "ways": chart.ways,

@@ -20,11 +20,13 @@ import numpy as np
 from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model import rules
+from dess.model.campaign import Campaign, check_years
 from dess.model.channel import Site, empty_scratch, world_of
 from dess.model.record import Records, empty_records_of, write_record
 from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.model.view import decide, team_of
 from dess.model.ways import MOST_ENTRIES, Ways
+from dess.model.years import Years, most_places
 from dess.physics.fleet import slowest
 from dess.physics.landing import is_over
 from dess.scenario.scenario import AnyScenario, ScenarioSpace
@@ -82,6 +84,7 @@ def simulate_batch(
     kinds = np.array([row[id(space)] for space in scenario], np.int64)
     spaces = spaces_of([*distinct.values()])
     check_slotted(spaces)
+    check_years(spaces, numbers)
     team = team_of(policy, spaces)
     records = empty_records_of(spaces, len(numbers))
 
@@ -149,7 +152,7 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
     for member, space in enumerate(spaces):
         # The return guard needs tables of ways in none of them or in all.
         has_costs = space.wind.blows or space.consumption.is_on
-        key = (Site.of(space), space.is_extended, has_costs)
+        key = (Site.of(space), space.is_extended, has_costs, space.weather.is_on)
         groups.setdefault(key, []).append(member)
     return [part for members in groups.values() for part in _by_energy(spaces, members)]
 
@@ -171,6 +174,9 @@ def _by_energy(spaces: list[ScenarioSpace], members: list[int]) -> list[np.ndarr
 def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
     """Simulate missions that share one grid with its nodes and channel, and write their records."""
     jobs, world = source[-1], world_of(spaces[0])
+    if spaces[0].weather.is_on:
+        _run_years(spaces, team, source, batch_size, records, progress, stopped)
+        return
     size = min(batch_size, len(jobs), max(MOST_WORK // max(map(work_of, spaces)), 1))
     state = state_of(spaces, size)
     scratch = empty_scratch(state.uavs.shape[1], len(world.nodes))
@@ -188,6 +194,16 @@ def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
         if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
             progress(int(queue[1]) - reported)
             reported = int(queue[1])
+
+
+def _run_years(spaces, team, source, batch_size, records, progress, stopped) -> None:
+    """Simulate years of fleets that share one grid, and write their records."""
+    starts, which, numbers, jobs = source
+    seed, world = int(starts.constants["seed"][0]), world_of(spaces[0])
+    size = min(batch_size, most_places(spaces, world.chart))
+    for part in np.array_split(jobs, -(-len(jobs) // size)):
+        campaigns = [Campaign(spaces[which[job]], seed, int(numbers[job])) for job in part]
+        Years(campaigns, world).run(team, records, part.tolist(), progress, stopped)
 
 
 @kernel

@@ -60,6 +60,26 @@ OPERATIONS = np.dtype(
     ]
 )
 
+# The same of a year at sea (``dess.model.campaign``): ``success`` and ``home`` are the shares of
+# its windows that have it. Then the share of the data that is on land later than ``due``, the
+# share of the operating hours that was open, the number of windows, and the longest time without
+# one [h].
+YEAR_RECORD = np.dtype(
+    [
+        (name, np.float64 if name in ("success", "home") else MISSION_RECORD[name])
+        for name in MISSION_RECORD.names or ()
+    ]
+)
+# Last come the mean ages in its months.
+AGES_OF_MONTHS = tuple(f"age_month_{month}" for month in range(1, 13))
+YEAR_OPERATIONS = np.dtype(
+    [
+        *OPERATIONS.descr,
+        *fields(np.float64, "late open windows longest_gap"),
+        *fields(np.float64, " ".join(AGES_OF_MONTHS)),
+    ]
+)
+
 # One node of a mission: its data [data units], of which ``collected`` is what UAVs have taken from
 # it (also what was lost with a UAV), its mean age, and its age at the end [slots].
 NODE_RECORD = np.dtype(fields(np.float64, "initial arrived collected residual age age_at_end"))
@@ -77,6 +97,10 @@ def measures_of(space: Constants) -> list[str]:
         ("queue", "waiting", "pad_requests", "utilisation"): space.charging.is_on,
         ("failures", "slots_grounded"): space.failures.is_on,
     }
+    if space.weather.is_on:
+        measured[("age",)] = True
+        measured[("peak_age", "age_p99")] = False
+        measured[("late", "open", "windows", "longest_gap")] = True
     return [name for names, is_measured in measured.items() if is_measured for name in names]
 
 
@@ -240,11 +264,16 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False, nodes: in
 
 
 def empty_records_of(spaces: Iterable[ScenarioSpace], missions: int) -> Records:
-    """``empty_records`` for missions of some scenarios."""
+    """``empty_records`` for missions of some scenarios, or for years of some with weather."""
     all_spaces = [*spaces]
     fleet = max((space.uavs[1] for space in all_spaces), default=0)
     nodes = max((len(space.nodes) for space in all_spaces if space.units), default=0)
-    return empty_records(missions, fleet, any(space.is_extended for space in all_spaces), nodes)
+    is_extended = any(space.is_extended for space in all_spaces)
+    records = empty_records(missions, fleet, is_extended, nodes)
+    if not any(space.weather.is_on for space in all_spaces):
+        return records
+    years = np.zeros(missions, YEAR_RECORD)
+    return records._replace(missions=years, operations=np.full(missions, np.nan, YEAR_OPERATIONS))
 
 
 @dataclass(frozen=True)
@@ -268,8 +297,11 @@ class MissionRecord:
     def __getattr__(self, name: str) -> Any:
         if name in (MISSION_RECORD.names or ()):
             return self.metrics[name].item()
-        if name in (OPERATIONS.names or ()) and self.operations is not None:
-            return self.operations[name].item()
+        operations = None
+        if name in (YEAR_OPERATIONS.names or ()):  # also while it is unpickled
+            operations = self.operations
+        if operations is not None and name in (operations.dtype.names or ()):
+            return operations[name].item()
         raise AttributeError(name)
 
     def __repr__(self) -> str:
@@ -283,7 +315,8 @@ class MissionRecord:
         """What was measured beyond the paper's metrics, without the columns that are nan."""
         if self.operations is None:
             return {}
-        values = {name: self.operations[name].item() for name in OPERATIONS.names or ()}
+        names = self.operations.dtype.names or ()
+        values = {name: self.operations[name].item() for name in names}
         return {name: value for name, value in values.items() if not isnan(value)}
 
     def uav_rows(self) -> list[dict[str, Any]]:

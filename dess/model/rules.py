@@ -38,7 +38,7 @@ from dess.physics.arrivals import draw_messages, has_messages
 from dess.physics.charging import charge_limit, gain, is_before, limit_battery, share_power
 from dess.physics.chart import is_open
 from dess.physics.energy import has_costs, spend_slot
-from dess.physics.failures import strike_if_on, take_pad, working_pads
+from dess.physics.failures import hide_data, strike_if_on, take_pad, working_pads
 from dess.physics.landing import flies, has_finished, is_over, lands, next_latch, stands
 from dess.physics.radio import is_below_steps
 from dess.physics.section import for_sections
@@ -71,23 +71,52 @@ def launch(state, b, starts, number, replication):
                 mission.seed, mission.replication, streams.INITIAL_DATA, 0, 0, k // 4
             )
         residual[k] = low + (high - low) * streams.uniform(words[k % 4])
-        mission.initial += residual[k]
         sensors[k].newest = sensors[k].hidden = 0.0
         sensors[k].silent = False
         sensors[k].rate = starts.rates[number, k]
-        _launch_node(mission, sensors[k], residual[k])
+        _launch_idle_node(mission, sensors[k], residual, k, starts.ages[number, k])
+        mission.initial += residual[k]
+        _launch_node(mission, sensors[k], residual, k, starts.silent[number, k])
 
 
 @for_sections
-def _launch_node(mission, sensor, initial):
+def _launch_idle_node(mission, sensor, residual, k, age_before):
+    """Let the data of a node be what it has collected before the mission, and of that age.
+
+    Where that is a Poisson number of messages, it is drawn in the place of its mean. Ages are
+    rounded to communication slots, since teeth are counted by them.
+    """
+    if mission.idle > 0.0:
+        mean = sensor.rate * mission.idle
+        residual[k] += draw_idle_data(mission, mean, k) - mean
+    sensor.newest = 0.0 - age.starting_age(mission, age_before + mission.idle)
+    mission.newest += sensor.newest
+
+
+@inlined
+def draw_idle_data(mission, mean, k):
+    """The data that node ``k`` has collected while it was idle; ``mean`` are those on average."""
+    words = streams.block(mission.seed, mission.replication, streams.INITIAL_DATA, 1, 0, k)
+    return draw_messages(mission, mean, words[0])
+
+
+@for_sections
+def _launch_node(mission, sensor, residual, k, is_silent):
     """Begin to count the data and the age of a node."""
-    sensor.initial = initial
-    sensor.arrived = sensor.collected = sensor.age_area = 0.0
+    sensor.initial = residual[k]
+    sensor.arrived = sensor.collected = sensor.late = 0.0
+    sensor.age_area = 0.0 - sensor.newest * sensor.newest / 2.0
+    sensor.silent = is_silent
+    if is_silent:
+        hide_data(mission, residual, sensor, k)
 
 
 @kernel
 def _launch_uavs(mission, types, uavs):
-    """Put the active UAVs on distinct cells of the start zone, drawn at random."""
+    """Put the active UAVs on distinct cells of the start zone, drawn at random.
+
+    One that has a cell in ``Starts.uavs`` begins there, with its battery.
+    """
     for i in range(len(uavs)):
         uavs[i] = types[i]
         u = uavs[i]
@@ -95,13 +124,14 @@ def _launch_uavs(mission, types, uavs):
         if not u.active:
             u.battery = 0
             continue
-        if u.battery == 0:
+        if u.battery == 0 and u.x < 0:
             u.battery = mission.flying_time
         limit_battery(mission, u)
-        cell = _start_cell(mission, i)
-        u.x = mission.zone_x + cell % mission.zone_width
-        u.y = mission.zone_y + cell // mission.zone_width
-        u.zone = 0
+        if u.x < 0:
+            cell = _start_cell(mission, i)
+            u.x = mission.zone_x + cell % mission.zone_width
+            u.y = mission.zone_y + cell // mission.zone_width
+            u.zone = 0
         u.from_x, u.from_y = u.x, u.y
         _update_latch(mission, u)  # a UAV may start at or below C_S
 

@@ -93,6 +93,9 @@ MISSION = np.dtype(
         ("continuous", np.int64),  # whether arrivals are
         ("own_rates", np.int64),  # whether nodes have their own, and arrival_rate is their mean
         ("message", np.float64),  # what a node makes at once [data units], 0 without messages
+        # How long nodes have collected data before the mission, and after which time data are late
+        # (0 for never) [slots].
+        *fields(np.float64, "idle due"),
         ("age_measured", np.int64),  # in the slotted model
         ("age_reward", np.float64),
         # Progress: mission slots done, UAVs still active, and data [data units], of which
@@ -171,10 +174,10 @@ _SENSOR_FIELDS = [
     ("rate", np.float64),  # its arrival rate, where nodes have their own
 ]
 PLAIN_SENSOR = np.dtype(_SENSOR_FIELDS, align=True)
-# With sections also: its data [data units], and the area below its age until the newest of its data
-# was collected [slots^2].
+# With sections also: its data [data units], the area below its age until the newest of its data
+# was collected [slots^2], and how long in all its age at a collection was above ``due`` [slots].
 SENSOR = np.dtype(
-    [*_SENSOR_FIELDS, *fields(np.float64, "initial arrived collected age_area")], align=True
+    [*_SENSOR_FIELDS, *fields(np.float64, "initial arrived collected age_area late")], align=True
 )
 
 
@@ -214,7 +217,13 @@ def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
 def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
     """How many lengths the teeth of ages can have in missions of these scenarios."""
     measured = (s for s in spaces if s.age.measured and not s.needs_events)
-    return max((s.max_slots * s.communication_slots + 1 for s in measured), default=0)
+    return max((_longest_age(s) + 1 for s in measured), default=0)
+
+
+def _longest_age(space: ScenarioSpace) -> int:
+    """The largest age of a node in a mission [communication slots]."""
+    idle = round(space.idle_slots * space.communication_slots)
+    return space.max_slots * space.communication_slots + idle
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
@@ -249,7 +258,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         ),
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
-        "message": arrivals.message,
+        **{"message": arrivals.message, "idle": scenario.idle_slots},
         "charge_rate": scenario.charge_fraction.numerator,
         "charge_slots": scenario.charge_fraction.denominator,
         "age_reward": scenario.age.reward,
@@ -304,6 +313,8 @@ class Starts(NamedTuple):
         uavs: (P, I) records of ``types_of``.
         data: (P, K, 2) ranges of the initial data of the nodes.
         rates: (P, K) arrival rates of the nodes.
+        ages: (P, K) ages of the nodes before they were idle [slots].
+        silent: (P, K) whether the nodes are silent.
     """
 
     constants: np.ndarray
@@ -311,6 +322,8 @@ class Starts(NamedTuple):
     uavs: np.ndarray
     data: np.ndarray
     rates: np.ndarray
+    ages: np.ndarray
+    silent: np.ndarray
 
 
 def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
@@ -324,7 +337,8 @@ def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
     ranges = np.stack([ranges_of(space) for space in spaces])
     types = np.stack([types_of(space, fleet) for space in spaces], dtype=UAV)
     data, rates = (np.array([getattr(s, of) for s in spaces]) for of in ("node_data", "node_rates"))
-    return Starts(constants, ranges, types, data, rates)
+    ages, silent = np.zeros(rates.shape), np.zeros(rates.shape, np.bool_)
+    return Starts(constants, ranges, types, data, rates, ages, silent)
 
 
 def _number_energies(constants: np.ndarray) -> None:

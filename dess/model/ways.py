@@ -115,3 +115,29 @@ def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) ->
         costs = mission["slot_costs"].reshape(-1, ACTIONS)[slots_per_cell - 1, :HOVERING]
         moves[:] = slots_per_cell * costs.astype(np.int64)[:, None, None]
     return moves
+
+
+class WaysOfPlaces:
+    """The same tables where the missions of a batch change their energy one by one.
+
+    Attributes:
+        reach: (B, C, S, H, W) as ``Ways.reach``, whose missions have the number of their place.
+        home: (B, S, H, W) as ``Ways.home``.
+    """
+
+    def __init__(self, places: int, slowest: int, chart: Chart):
+        """Make room for so many places, whose fleets take at most ``slowest`` slots for a cell."""
+        self._sea = (chart.zones.shape, chart.zones.tobytes(), chart.parking.tobytes())
+        self._slowest = slowest
+        cells, size = len(chart.parking), chart.zones.size
+        speeds = slowest
+        if cells * slowest * size > MOST_ENTRIES:
+            speeds = 0
+        self.reach = np.zeros((places, cells, speeds, *chart.zones.shape), np.int32)
+        self.home = np.zeros((places, slowest, *chart.zones.shape), np.int32)
+
+    def fill(self, b: int, missions: np.ndarray) -> None:
+        """Compute the tables of place ``b`` for the energy of its mission, of (1,) records."""
+        energy = part_of(missions, ENERGY_PART).tobytes()
+        for table, groups in ((self.reach, self.reach.shape[1]), (self.home[:, None], 1)):
+            table[b] = _filled(*self._sea, groups, self._slowest, energy)

@@ -67,9 +67,11 @@ def add_tooth(mission, sensor, high, low):
     """Note that the age of a node falls from ``high`` to ``low`` [slots].
 
     The age begins with 0 and grows by 1 per slot, so what lies below it up to here grows by the
-    difference of the squares, halved.
+    difference of the squares, halved. Data above the age ``due`` are late.
     """
     sensor.age_area += (high * high - low * low) / 2.0
+    if mission.due > 0.0:
+        sensor.late += max(high - mission.due, 0.0)
 
 
 @inlined
@@ -77,6 +79,12 @@ def age_of_node(mission, sensor):
     """The mean age of a node over the slots of a mission, and its age at their end [slots]."""
     at_end = mission.slot - sensor.newest
     return (sensor.age_area + at_end * at_end / 2.0) / max(mission.slot, 1), at_end
+
+
+@inlined
+def starting_age(mission, age):
+    """An age with which a mission begins [slots], rounded to communication slots."""
+    return round(age * mission.communication_slots) / mission.communication_slots
 
 
 @inlined
@@ -107,7 +115,8 @@ def write_age(mission, sensors, teeth, out):
         weights[row] = teeth[lengths[row]]
         ended += teeth[lengths[row]]
         peaks += highs[row] * weights[row]
-    for k in range(mission.nodes):  # the last tooth of a node has no peak
+    for k in range(mission.nodes):  # the last tooth of a node has no peak, the first begins here
+        lows[len(lengths) + k] = starting_age(mission, mission.idle)
         highs[len(lengths) + k] = _length(mission, sensors[k], mission.slot) / m
     out.age, out.age_p99 = age_of_teeth(lows, highs, weights)
     out.peak_age = peaks / ended if ended > 0 else math.nan

@@ -225,6 +225,12 @@ def _strike_node(mission, residual, sensor, k):
         residual[k] += sensor.hidden
         sensor.hidden = 0.0
         return
+    hide_data(mission, residual, sensor, k)
+
+
+@inlined
+def hide_data(mission, residual, sensor, k):
+    """Hide the data that a silent node has, or lose them."""
     if mission.node_data_lost:
         mission.lost += residual[k]
     else:

@@ -34,6 +34,7 @@ UAV_FAILURE = 10  # failures and repairs per UAV and mission slot
 PAD_FAILURE = 11  # the same per charging pad
 NODE_FAILURE = 12  # the same per node
 SEA = 13  # the geometry of a generated sea
+YEAR = 14  # the order of the years of a series of weather
 
 MAX_SEED = 2**64 - 1
 MAX_REPLICATION = 2**32 - 1

@@ -8,7 +8,7 @@ import numpy as np
 from dess.base.errors import InputError, listed, shown
 from dess.physics.age import MOST_TEETH
 from dess.physics.arrivals import MOST as MOST_RATE
-from dess.physics.arrivals import MOST_MESSAGES
+from dess.physics.arrivals import MOST_AMOUNT, MOST_MESSAGES
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
 from dess.physics.energy import MOST as MOST_COST
 from dess.physics.energy import PERCENT
@@ -128,12 +128,17 @@ def _too_large(c: Fields) -> Iterator[InputError]:
             f"at most {most:,} nodes and cells of zones on so many cells",
         )
     has_teeth = c.age.measured and not c.needs_events
-    if has_teeth and c.max_slots * c.communication_slots > MOST_TEETH:
+    if has_teeth and (c.max_slots + c.idle_slots) * c.communication_slots > MOST_TEETH:
         yield InputError(
             "age.measured",
             "the mission has too many communication slots",
-            f"max_slots * communication_slots <= {MOST_TEETH}",
+            f"max_slots * communication_slots <= {MOST_TEETH}, with the slots of idle",
         )
+    if c.idle_slots and c.needs_events:
+        yield InputError("data_sheet.idle", "needs slotted arrivals", "without it, or slotted")
+    if c.idle_slots and np.max(c.node_data) > MOST_AMOUNT:
+        problem = f"a node has {np.max(c.node_data):,.3g} data units at the start"
+        yield InputError("data_sheet.idle", problem, f"{MOST_AMOUNT:g} data units at most")
     if c.packets > MOST_PACKETS:
         yield InputError(
             "arrivals",

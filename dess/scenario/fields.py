@@ -41,6 +41,7 @@ SECTIONS = (
 # The fields of seas that the paper does not have; records are the same with and without them.
 GEOMETRY = ("rows", "zones", "no_fly", "names", "moved", "centre")
 LANDING = "landing"
+MOST_YEAR = 366 * 86_400  # [s]
 ZONE_PADS = "zones.pads"  # sets the pads of the zones of ``zones``, and leaves their cells
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
@@ -378,6 +379,13 @@ class Fields(Strict):
         return bool(value)
 
     @property
+    def longest_slots(self) -> int:
+        """The most mission slots that a mission may last, or with weather a year."""
+        if self.weather.is_on and self.units:
+            return int(MOST_YEAR / self.units.slot)
+        return self.max_slots
+
+    @property
     def needs_events(self) -> bool:
         """Whether only the SimPy engine can simulate the scenario."""
         return self.arrivals.process != "slotted"
@@ -408,12 +416,30 @@ class Fields(Strict):
 
     @property
     def node_data(self) -> tuple[tuple[float, float], ...]:
-        """The range of the initial data of each node [data units]."""
+        """The range of the initial data of each node [data units].
+
+        Of a node that was idle before the mission they are what it has on average.
+        """
         if self.arrivals.initial:
-            return tuple((amount, amount) for amount in self.arrivals.initial)
-        low, high = self.initial_data
-        merged = self.arrivals.merged or (1,) * len(self.nodes)
-        return tuple((low * count, high * count) for count in merged)
+            ranges = [(amount, amount) for amount in self.arrivals.initial]
+        else:
+            low, high = self.initial_data
+            merged = self.arrivals.merged or (1,) * len(self.nodes)
+            ranges = [(low * count, high * count) for count in merged]
+        idle = self.idle_slots
+        if not idle:
+            return tuple(ranges)
+        collected = [rate * idle for rate in self.node_rates]
+        return tuple(
+            (low + more, high + more) for (low, high), more in zip(ranges, collected, strict=True)
+        )
+
+    @property
+    def idle_slots(self) -> float:
+        """How long nodes have collected data before the mission [slots]; 0 without a data sheet."""
+        if not self.data_sheet.is_on:
+            return 0.0
+        return self.data_sheet.number("idle") / self.data_sheet.units.slot
 
     def value(self, field: str) -> Any:
         """The value of a field; ``failures.uav_rate`` is the field of a section."""

@@ -69,8 +69,43 @@ SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
+_CRUISE = "data_sheet.cruise"
+
 # The context of a scenario whose cells may be where they must not be.
 DRAFT = "draft"
+
+
+def changed(values: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The values of a scenario with changes of some of them.
+
+    Args:
+        values: The values.
+        changes: What replaces some of them, as for ``merged``. Where that is the cruise of the data
+            sheet, the cell stays, and the endurance is still that of the cruise before.
+        where: What names the scenario in messages.
+
+    Raises:
+        InputError: If the changes do not fit, or the data sheet is not valid.
+    """
+    return merged(merged(dict(values), dict(changes)), _kept_at_cruise(values, changes, where))
+
+
+def _kept_at_cruise(
+    values: Mapping[str, Any], changes: Mapping[str, Any], where: str
+) -> dict[str, Any]:
+    """What a data sheet keeps where its cruise is replaced."""
+    replaced = dotted(dict(changes))
+    others = {field: value for field, value in replaced.items() if field != _CRUISE}
+    sheet = merged(dict(values), others).get("data_sheet")
+    if _CRUISE not in replaced or not (isinstance(sheet, dict) and sheet.get("cruise")):
+        return {}
+    of_file = validated(DataSheet, sheet, where)
+    kept = {}
+    if not of_file.cell:
+        kept["data_sheet.cell"] = f"{of_file.units.cell!r} m"
+    if "data_sheet.endurance" not in replaced and " at " not in (of_file.endurance or ""):
+        kept["data_sheet.endurance"] = f"{of_file.endurance} at {of_file.cruise}"
+    return kept
 
 
 class Constants(Fields):
@@ -141,7 +176,7 @@ class Constants(Fields):
         base = {}
         if scenario is not None:
             base = loaded(scenario).model_dump()
-        return validated(cls, merged(base, values), "scenario")
+        return validated(cls, changed(base, values, "scenario"), "scenario")
 
     def limits(self, field: str) -> tuple[float, float]:
         """The least and the largest value that a numeric field may have, infinite without a limit.
@@ -163,6 +198,12 @@ class Constants(Fields):
         least = [m.ge for m in limits if hasattr(m, "ge")]
         most = [m.le for m in limits if hasattr(m, "le")]
         return between.get(field) or (max(least, default=-inf), min(most, default=inf))
+
+    def without_weather(self) -> Self:
+        """The scenario of one mission in still air, if it is one of years, or else itself."""
+        if not self.weather.is_on:
+            return self
+        return self.model_copy(update={"weather": type(self.weather).off()})
 
     def to_toml(self) -> str:
         """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
@@ -285,7 +326,7 @@ def _of_values(
 ) -> ScenarioSpace:
     """The scenario of the values that its file has, and of those that replace them."""
     read.pop("description", None)
-    values = merged(_with_weather_beside(name_or_path, read), overrides)
+    values = changed(_with_weather_beside(name_or_path, read), overrides, where)
     if named := unread(read) | unread(values):
         draft = validated(ScenarioSpace, values | named, where, DRAFT)
         beside = partial(_SCENARIOS.beside, name_or_path)

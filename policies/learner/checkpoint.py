@@ -7,6 +7,7 @@ actions, so they are compared with what the scenario has. Nothing is unpickled.
 
 import json
 from collections.abc import Mapping
+from math import ceil
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -326,7 +327,8 @@ def _check_state(state: State, space: ScenarioSpace) -> None:
         (missions, {"uavs": (1, fleet), "slot": (0, slots)}),
         (uavs, of_uavs | truths),
         (uavs[is_there], dict.fromkeys(cells, (0, edge))),
-        (state.sensors, {"newest": (0, missions["slot"][:, None])}),  # ages are indices of teeth
+        # Ages are indices of teeth.
+        (state.sensors, {"newest": (-ceil(space.idle_slots), missions["slot"][:, None])}),
     ]
     for records, ranges in allowed:
         for name, (low, high) in ranges.items():

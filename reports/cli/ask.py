@@ -27,11 +27,14 @@ if TYPE_CHECKING:
 PRICE = "a price and its amount, e.g. uav=20000"
 SHARE = "a metric and its least mean, e.g. success=0.99"
 
+WHAT_IF_QUESTION = "what-if question"
+
 app = typer.Typer()
 
 
 @options.add_command(app)
 def sweep(
+    context: typer.Context,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.complete_fields),
@@ -41,6 +44,7 @@ def sweep(
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
+    years: options.YearsOption = None,
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
@@ -88,12 +92,13 @@ def sweep(
         values,
         scenario,
         policies,
-        missions,
+        options.given(context, "missions"),
         seed,
         _prices_of(price),
         options.parse_all_settings(map(_with_quotes, require or []), "--require", SHARE),
         name,
         folder=results,
+        years=years,
     )
     parameters = {}
     if metric:
@@ -113,6 +118,7 @@ def sweep(
 
 @options.add_command(app, WHAT_IF)
 def what_if(
+    context: typer.Context,
     settings: Annotated[
         list[str],
         typer.Option(options.SET, metavar="KEY=VALUE", autocompletion=options.complete_fields),
@@ -124,6 +130,7 @@ def what_if(
         list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
     missions: Annotated[int, typer.Option(min=2)] = 500,
+    years: options.YearsOption = None,
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
@@ -158,7 +165,15 @@ def what_if(
     fixed = options.parse_all_settings(baseline or [], "--baseline")
     prices = _prices_of(price)
     question = what_if_question(
-        changes, fixed, scenario, policy, missions, seed, results, prices=prices
+        changes,
+        fixed,
+        scenario,
+        policy,
+        options.given(context, "missions"),
+        seed,
+        results,
+        prices=prices,
+        years=years,
     )
     check_shown(question, shown)
     asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
@@ -168,7 +183,7 @@ def what_if(
         "baseline": fixed,
         "scenario": scenario,
         "policies": [*map(str, question.study.policies)],
-        "missions": missions,
+        "missions": None if question.study.years else missions,
         "seed": seed,
         "prices": prices or None,
         "shown": shown,
@@ -180,7 +195,7 @@ def what_if(
         render([WHAT_IF], results, out, progress, parameters)
         return out / f"{WHAT_IF}.html"
 
-    _print_answer(question, answer, render, as_json, "what-if question")
+    _print_answer(question, answer, render, as_json, WHAT_IF_QUESTION)
 
 
 def _run_question(
@@ -238,7 +253,10 @@ def _print_answer(
             print_facts(assumed)
         console.print_text(f"study: {question.file}")
     page = None
-    if absent := missing("reports", f"the page of a {asked}"):
+    absent: object = missing("reports", f"the page of a {asked}")
+    if question.study.years and asked == WHAT_IF_QUESTION:
+        absent = "it draws single missions, and these are years"
+    if absent:
         console.print_text(f"no page: {absent}", sys.stderr)
     else:
         with rendering_bar() as progress:

@@ -24,12 +24,14 @@ _DIFFERENCE = ["difference", "low", "high", "p", "p_adjusted", "n"]
 
 @options.add_command(app)
 def evaluate(
+    context: typer.Context,
     policy: Annotated[
         list[str], typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ],
     scenario: options.ScenarioOption = "paper",
     settings: options.SetOption = None,
     missions: Annotated[int, typer.Option(min=1)] = 1000,
+    years: options.YearsOption = None,
     seed: options.SeedOption = 0,
     engine: Literal["batch", "events"] | None = None,
     process: options.ProcessOption = None,
@@ -57,15 +59,17 @@ def evaluate(
         estimate_means,
     )
     from dess.analysis.metrics import metric_in_space
-    from dess.analysis.study.study import engine_of
+    from dess.analysis.study.study import engine_of, replications_of
     from dess.model.record import measures_of
 
     space = options.load_space(scenario, settings)
+    replications = replications_of(space, options.given(context, "missions"), years, missions)
+    ((unit, number),) = replications.items()
 
     processes = tuple(options.typed_processes(process))
     engine = engine_of([space], engine, processes)
     if out:
-        study: dict[str, Any] = {"scenario": scenario, "policies": policy, "missions": missions}
+        study: dict[str, Any] = {"scenario": scenario, "policies": policy} | replications
         study |= {
             "set": dict(map(options.parse_setting, settings or [])),
             "seed": seed,
@@ -73,13 +77,13 @@ def evaluate(
         }
         evaluations = _evaluate_as_study(study, processes, out, workers, yes)
     else:
-        about = (missions, seed, engine, workers)
+        about = (number, seed, engine, workers)
         asked = [Asked(space, team, *about, run_files=True, processes=processes) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
         with (
             console.compile_notice(),
-            console.progress_bar("mission", missions * len(policy)) as bar,
+            console.progress_bar(unit.removesuffix("s"), number * len(policy)) as bar,
         ):
             evaluations = [estimate_means(of_team, bar.update) for of_team in asked]
         options.note_departures(policy, [space])
@@ -87,7 +91,7 @@ def evaluate(
     rows = [
         {
             "policy": evaluation.policy,
-            "missions": missions,
+            unit: number,
             "seed": seed,
             "engine": engine,
             "uav_slots": evaluation.uav_slots,
@@ -168,7 +172,8 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
             engine += f" with {', '.join(row['processes'])}"
         speed = f" in {row['seconds']:.2f} s: {row['uav_slots'] / row['seconds']:,.0f} UAV-slots/s"
         took = "" if row["seconds"] != row["seconds"] else speed
-        counted = f"{row['missions']} {inflect('mission', row['missions'])}"
+        unit = "year" if "years" in row else "mission"
+        counted = f"{row[f'{unit}s']} {inflect(unit, row[f'{unit}s'])}"
         console.print_text(f" {counted}, {row['uav_slots']} UAV-slots{took}{engine}")
 
 

@@ -106,8 +106,24 @@ ProcessOption = Annotated[
         "SimPy engine runs it.",
     ),
 ]
+YearsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--years",
+        min=1,
+        help="Years of weather, in place of missions.  [default: 10 where a scenario has weather]",
+    ),
+]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+
+
+def given(context: typer.Context, name: str) -> Any:
+    """The value of an option that somebody has typed; None if it is the default."""
+    source = context.get_parameter_source(name)
+    if source is None or source.name == "DEFAULT":
+        return None
+    return context.params[name]
 
 
 def add_command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], Callable]:

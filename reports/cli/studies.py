@@ -49,6 +49,7 @@ def run(
     workers: options.WorkersOption = 1,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
     missions: Annotated[int | None, typer.Option(min=1)] = None,
+    years: options.YearsOption = None,
     policy: Annotated[
         list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
     ] = None,
@@ -74,7 +75,7 @@ def run(
     from dess.analysis.execution.effort import check_run, plan_study
     from dess.analysis.study.study import load_study
 
-    changes = {"missions": missions, "policies": policy}
+    changes = {"missions": missions, "years": years, "policies": policy}
     chosen = {key: value for key, value in changes.items() if value is not None}
     processes = options.typed_processes(process)
     studies = [load_study(name, processes=processes, **chosen) for name in names]

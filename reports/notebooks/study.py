@@ -105,7 +105,7 @@ make_facts(answer.facts())
 # %% tags=["if-brief"]
 show_parts(page.draw_typical_mission(study))
 
-# %%
+# %% tags=["if-missions"]
 page.make_panel_of(study, by)
 
 # %% tags=["if-sheet"]
@@ -294,7 +294,7 @@ show_parts(
 # %% tags=["if-sensitivity"]
 worst = worst_missions(study, ranks.best_policy(study.missions))
 
-# %%
+# %% tags=["if-missions"]
 show_parts(
     worst_missions_table(study, worst),
     write_markdown("{commands}", commands=page.list_commands(study, worst)),

@@ -315,6 +315,7 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         kind = "grid"  # it varies one field at most
     is_ranked = kind != "saltelli"
     is_search = isinstance(study.selection, Cheapest)
+    has_missions = not study.years
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {
         # Several design points with as many missions each: settings to rank.
@@ -348,6 +349,8 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-priced-search": is_search and results.prices.pays_for_missions,
         # A scenario in units, and what changes a little around the cheapest fleet.
         "if-sheet": all(space.units for space in manifest.scenarios),
-        "if-brief": is_search and all(space.units for space in manifest.scenarios),
+        "if-brief": has_missions and is_search and all(space.units for space in manifest.scenarios),
+        # Replications are missions, which can be looked at one by one.
+        "if-missions": has_missions,
         "if-around": is_search and around.is_known(results),
     }

@@ -27,6 +27,7 @@ from dess.analysis.results.resimulate import (
     difference_in_words,
     draw_numbers,
     learned_files,
+    record_of,
 )
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
@@ -201,8 +202,7 @@ def _compare_missions(evidence: Evidence, drawn: _Drawn, named: Collection[str] 
     lines = []
     processes = evidence.load_processes(named)
     for mission, space, team in drawn:
-        about = (space, team, evidence.seed, mission.replication)
-        record = simulate(*about, processes=processes)
+        record = record_of(space, team, evidence.seed, mission.replication, processes)
         if changed := difference_in_words(record, mission.record):
             coordinates = (mission.policy, mission.values, mission.replication)
             command = tables.of_fields(evidence, *coordinates)

@@ -72,11 +72,13 @@ def rule_of_thumb(results: Results, policy: str, points: Sequence[int]) -> RuleO
         points: The design points of the fleet, one for each condition.
 
     Returns:
-        The rule; None without a data sheet, or if no UAV has charged.
+        The rule; None without a data sheet, of years, or if no UAV has charged.
     """
     missions = results.missions
     scenarios = results.store.manifest.scenarios
     if "pad_requests" not in missions or not all(scenarios[point].units for point in points):
+        return None
+    if any(scenarios[point].weather.is_on for point in points):
         return None
     is_of_fleet = (missions["policy"] == policy) & missions["point"].isin(points)
     is_of_its_uavs = (results.uavs["policy"] == policy) & results.uavs["point"].isin(points)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import late_slots, usable_battery
+from dess.model.guard.battery import late_slots, margin_slots, usable_battery
 from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     KEPT,
@@ -33,6 +33,7 @@ from dess.scenario.fields import MOST_ZONES
 # What teammates do with a zone cell: nothing; one is on it that may leave it, as it is not parked;
 # one takes it.
 _FREE, _OCCUPIED, _TAKEN = range(3)
+_LATE = 2**24  # a slot of being late counts more than all battery of a way [% / 1000]
 
 
 class Parking(NamedTuple):
@@ -313,6 +314,9 @@ def _soonest_free(mission, uavs, i, chart, memory, reach):
 def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
     """The cell of one zone, or of all (-1), that takes least battery.
 
+    One that the UAV cannot reach before the mission ends is worse than any that it can: where the
+    wind makes the ways to a zone cheap, the way to another may be shorter.
+
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
@@ -327,6 +331,7 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         The number of the cell, -1 if there is none; the way to it [cells]; the battery for it.
     """
     u, best, best_zone, way, least = uavs[i], -1, -1, -1, -1
+    battery = -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
@@ -339,6 +344,8 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
             continue
         cells = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
-        if best < 0 or spent < least or (spent == least and cells < way):
-            best, best_zone, way, least = cell, zone, cells, spent
-    return best, way, least
+        slots = cells * u.slots_per_cell + 1 + margin_slots(mission, u)
+        price = spent + _LATE * late_slots(mission, slots)
+        if best < 0 or price < least or (price == least and cells < way):
+            best, best_zone, way, least, battery = cell, zone, cells, price, spent
+    return best, way, battery

@@ -11,4 +11,5 @@ ASSUMED = {
     "tip_speed": f"{TIP_SPEED:g} m/s",
     "induced_speed": f"{INDUCED_SPEED:g} m/s",
     "climb": "3 m/s",
+    "delivery": "14 d",
 }

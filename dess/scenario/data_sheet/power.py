@@ -38,14 +38,27 @@ class Power(Quantities):
     @property
     def units(self) -> Units:
         """What a slot, a cell and a data unit are."""
+        bandwidth = self.number("bandwidth")
+        if self.cell:
+            slot = self.number("cell") / self.number("cruise")
+            return Units(slot, self.number("cell"), slot * bandwidth)
         slot = self.endurance_at_cruise / 100
-        return Units(slot, slot * self.number("cruise"), slot * self.number("bandwidth"))
+        return Units(slot, slot * self.number("cruise"), slot * bandwidth)
+
+    @property
+    def slot_of_cruising(self) -> Fraction:
+        """The battery that a slot of cruising takes in still air [%], exactly as typed."""
+        if not self.cell:
+            return Fraction(1)
+        assert self.cruise
+        slot = exactly(self.cell, "m")[0] / exactly(self.cruise, "m/s")[0]
+        return 100 * slot / self.exact_endurance
 
     @property
     def charge_rate(self) -> Fraction:
         """The battery that a charging slot adds [%], exactly as the times were typed."""
         assert self.charging
-        return self.exact_endurance / exactly(self.charging, "s")[0]
+        return self.slot_of_cruising * self.exact_endurance / exactly(self.charging, "s")[0]
 
     @property
     def exact_endurance(self) -> Fraction:
@@ -85,6 +98,11 @@ class Power(Quantities):
         return self.endurance_at_cruise * self.wing.power(self.number("cruise"))
 
     @property
+    def delivery_ms(self) -> int:
+        """The time until a lost UAV is replaced where no spare is left [ms]."""
+        return round(1000 * self.number("delivery"))
+
+    @property
     def _endurance_at(self) -> tuple[float, float] | None:
         """The flying time [s] and the speed for which it is given [m/s]; None for the cruise."""
         if self.endurance and " at " in self.endurance:
@@ -103,6 +121,7 @@ class Power(Quantities):
         if self.wind:
             wind, direction = measured(self.wind, "m/s from deg")
         wing = self.wing
+        of_cruising = float(PERCENT * self.slot_of_cruising)
         costs = []
         for slots in range(1, SPEEDS + 1):
             speed = self.number("cruise") / slots
@@ -111,7 +130,7 @@ class Power(Quantities):
             shares = [wing.power(airspeed) / of_cruise for airspeed in (*airspeeds, wind)]
             # A share that is whole but for the rounding of floats is not rounded up.
             north, east, south, west, hover = (
-                max(math.ceil(PERCENT * share - 1e-6), 1) for share in shares
+                max(math.ceil(of_cruising * share - 1e-6), 1) for share in shares
             )
             costs.append((north, east, south, west, hover))
         return tuple(costs)

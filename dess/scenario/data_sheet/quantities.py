@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from dess.base.descriptions import Description, description_of
 from dess.base.errors import InputError, shown
 from dess.physics.radio import MOST_STEPS
-from dess.physics.section import Section
+from dess.physics.section import Integer, Section
 from dess.scenario.data_sheet.defaults import ASSUMED
 from dess.scenario.quantities import KINDS, form_of, measured, refuse
 from dess.scenario.rotary_wing import INDUCED_SPEED, TIP_SPEED
@@ -65,6 +65,9 @@ class Quantities(Section):
         ),
     )
     cruise: str | None = _quantity("m/s", "cruising speed over ground")
+    cell: str | None = _quantity(
+        "m", "side of a cell, or else the way of a hundredth of the endurance", example="315 m"
+    )
     max_speed: str | None = _quantity(
         "m/s", "largest speed through the air, needed with wind", example="23 m/s"
     )
@@ -96,6 +99,9 @@ class Quantities(Section):
             "data of a node at the start, or else none", form="one for all, or a list for each"
         ),
         0,
+    )
+    idle: str | None = _quantity(
+        "s", "how long nodes have collected data before the mission, or else not", example="16 h"
     )
     message: str | None = _quantity("bit", "what a node makes at once", 1, example="1 kB")
     bandwidth: str | None = _quantity("Hz", "bandwidth of the radio")
@@ -150,6 +156,16 @@ class Quantities(Section):
         example="1 d",
     )
 
+    spares: Integer = Field(
+        0,
+        ge=0,
+        le=100,
+        description="UAVs that stand in for lost ones, in years with weather",
+    )
+    delivery: str | None = _quantity(
+        "s", "time until a lost UAV is replaced where no spare is left", example="14 d"
+    )
+
     @classmethod
     def extra(cls, name: str) -> dict[str, Any]:
         """The units of a field, and the limits of its numbers."""
@@ -170,7 +186,7 @@ class Quantities(Section):
         """
         if name == "rates":
             cls._check_rates(value)
-        elif name != "modulation":
+        elif name not in ("modulation", "spares"):
             cls._check_quantities(name, value)
 
     @classmethod

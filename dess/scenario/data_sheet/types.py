@@ -84,7 +84,7 @@ class Types(Power):
         endurance = self.exact_endurance
         if kind.endurance:
             endurance = self._endurance_of_type(kind)
-        return endurance / exactly(kind.charging, "s")[0]
+        return self.slot_of_cruising * endurance / exactly(kind.charging, "s")[0]
 
     def _endurance_of_type(self, kind: UavType) -> Fraction:
         """The flying time of a type of UAVs at its cruising speed in still air [s]."""

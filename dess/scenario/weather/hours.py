@@ -120,7 +120,7 @@ def hours_of(space: Fields) -> Hours:
         sheet.number("cruise"),
         sheet.number("max_speed"),
         sheet.number("altitude"),
-        float(PERCENT * getattr(sheet, "slot_of_cruising", 1)),
+        float(PERCENT * sheet.slot_of_cruising),
         tuple(sorted({kind.slots_per_cell for kind in space.fleet} or {1})),
     )
     return _hours_of(flight, version_of(space.weather.path))

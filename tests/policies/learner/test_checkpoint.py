@@ -13,7 +13,7 @@ from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 from dess import InputError
-from dess.model.state import MISSION, SENSOR, UAV
+from dess.model.state import MISSION, PLAIN_SENSOR, UAV
 from dess.policies.learner.arrays import hash_arrays, to_bytes
 from dess.policies.learner.checkpoint import load_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL
@@ -103,7 +103,7 @@ UAVS |= {"pad": 10**6, "zone": 9, "slots_per_cell": 100}
 RECORDS: dict[str, tuple[np.dtype, dict[str, Any]]] = {
     "stepper.uavs": (UAV, UAVS),
     "stepper.missions": (MISSION, {"grid": 10**9, "nodes": 10**6, "uavs": 64, "slot": -1}),
-    "stepper.sensors": (SENSOR, {"newest": -1e9}),
+    "stepper.sensors": (PLAIN_SENSOR, {"newest": -1e9}),
 }
 
 
