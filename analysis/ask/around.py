@@ -167,9 +167,10 @@ def table_around(results: Results) -> Table:
     if has_conditions(results):
         condition = conditions_in_words(results)[search_of(results).best.points[-1]]
         fleet += f" under {condition}"
+    replications = numbers.format_count(data["n"][0], results.study.replication_name)
     caption = (
         f"The fleet of {fleet}, and one more of it: means, and in brackets changes on the same "
-        f"{data['n'][0]:,} missions, with {INTERVALS}. Whether requirements are met is what the "
+        f"{replications}, with {INTERVALS}. Whether requirements are met is what the "
         "search has shown; of a fleet that it did not have, they are met or missed if the whole "
         "interval of each mean says so, otherwise open"
     )

@@ -48,7 +48,7 @@ MANY_POINTS = 40  # more design points are not listed
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
     study = results.study
-    missions = numbers.format_count(len(results.missions), "mission")
+    missions = numbers.format_count(len(results.missions), study.replication_name)
     console.print_text(f"{folder}: {missions} of study {study.name}")
     if results.store.manifest.processes:
         console.print_text(f" with {results.store.manifest.functions}, in the SimPy engine")
@@ -82,7 +82,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
 
 def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
     """Print the means of a study that is not complete, with the missions of each."""
-    missions = numbers.format_count(len(results.missions), "mission")
+    name = results.study.replication_name
+    missions = numbers.format_count(len(results.missions), name)
     console.print_text(f"{folder}: {missions} of study {results.study.name}, which is incomplete")
     if results.study.selection:
         console.print_text(" intervals do not allow for the search, which has not ended")
@@ -96,7 +97,7 @@ def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
         ]
         rows.append([policy, points[int(point)], f"{of_setting['n'].max():,}", *estimates])
     heads = [metric_of(metric).head for metric in (SUCCESS, RATIO, PRODUCT)]
-    console.print_table(["policy", "setting", "missions", *heads], rows[:MANY_POINTS])
+    console.print_table(["policy", "setting", f"{name}s", *heads], rows[:MANY_POINTS])
     if (more := len(rows) - MANY_POINTS) > 0:
         console.print_text(f" {more:,} more rows; --csv and --json have them")
 

@@ -49,7 +49,7 @@ _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
 def list_simulated(results: Results) -> Marked:
-    """What was simulated: scenario, policies, design and missions, as a list."""
+    """What was simulated: scenario, policies, design and missions or years, as a list."""
     manifest = results.store.manifest
     study = manifest.study
     points = len(manifest.points)
@@ -73,7 +73,7 @@ def list_simulated(results: Results) -> Marked:
         ),
         f"- **Policies:** {policies}.",
         *_describe_design(results),
-        f"- **Missions:** {missions}{unit}, {len(results.missions):,} in all.",
+        f"- **{results.replications_head}:** {missions}{unit}, {len(results.missions):,} in all.",
         list_notes(results),
     ]
     return Marked("\n".join(filter(None, lines)))

@@ -228,8 +228,9 @@ class CheapestFleet:
             yield Fact("UAVs without it, which have no price", f"{number} of a mission")
 
     def _missions_fact(self) -> Fact:
-        """On which missions the fleet was measured."""
-        missions = numbers.format_count(int(self.estimates(SUCCESS)["n"]), "mission")
+        """On which missions or years the fleet was measured."""
+        name = self.results.study.replication_name
+        missions = numbers.format_count(int(self.estimates(SUCCESS)["n"]), name)
         source = "of the search"
         if not self.results.checks.empty:
             source = "that check it"
@@ -252,13 +253,14 @@ class CheapestFleet:
         return Fact("a cheaper one may lie beyond", ends)
 
     def _undecided_fact(self) -> Fact:
-        """Which fleet the budget left undecided, and about how many missions would settle it."""
+        """Which fleet is undecided, and about how many missions or years would settle it."""
         choice = self._choice
         if not choice.done or self._answer.settled:
             return Fact("undecided", "")
-        enough = "far more missions"
+        name = self.results.study.replication_name
+        enough = f"far more {name}s"
         if choice.enough:
-            enough = f"about {float(f'{choice.enough:.2g}'):,.0f} missions"
+            enough = f"about {float(f'{choice.enough:.2g}'):,.0f} {name}s"
         return Fact("undecided", f"{self._undecided_in_words()}; {enough} would settle it")
 
     def _undecided_in_words(self) -> str:

@@ -29,6 +29,7 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
+    AGE,
     COST,
     HOME,
     PRODUCT,
@@ -65,13 +66,16 @@ MOST_NAMES = 3  # the largest number of settings that are named because they may
 
 
 def ranking_metric(results: Results, metric: str | None = None) -> str:
-    """The metric that ranks the settings: the given one, the one of the selection, or the product.
+    """The metric that ranks the settings: the given one, that of the selection, or the product.
+
+    Of years it is the age of information: their collection ratio tends to 1.
 
     Raises:
         InputError: If there is no such metric.
     """
     if metric is None:
-        metric = getattr(results.study.selection, "metric", PRODUCT)
+        usual = AGE if results.study.years else PRODUCT
+        metric = getattr(results.study.selection, "metric", usual)
     return ranking_column(metric, results.missions)
 
 
@@ -105,7 +109,8 @@ def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> li
     if metric in (SUCCESS, PRODUCT) and may_end_in_the_air(results):
         columns.append(metric_of(HOME))
     facts = [Fact(each.within, _estimate(best, each)) for each in columns]
-    facts.append(Fact("measured in", numbers.format_count(best["n"], "mission")))
+    name = results.study.replication_name
+    facts.append(Fact("measured in", numbers.format_count(best["n"], name)))
     facts.append(Fact("hardly served", hardly_served_nodes(results, policy, [point])))
     facts += _comparison_facts(results, table.iloc[1:])
     ends = ends_in_words(results, point, ends_of_point(results, point))
@@ -328,4 +333,4 @@ def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.Data
     cells = named_cells(results, rows)
     for measure in map(metric_of, with_way_home(results, metrics_of_page(metric))):
         cells[measure.name] = numbers.format_estimates(rows, measure.column, measure.written)
-    return cells.assign(Missions=format_counts(rows["n"]))
+    return cells.assign(**{results.replications_head: format_counts(rows["n"])})
