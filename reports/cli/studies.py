@@ -130,18 +130,19 @@ def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -
     from dess.analysis.execution.effort import total_time
     from dess.analysis.numbers import format_count
 
+    name = study.replication_name
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
-    console.print_table(["policy", f"{study.replication_name}s", "present", "time on one core"], rows)
+    console.print_table(["policy", f"{name}s", "present", "time on one core"], rows)
     per_cell = format_count(study.first, "replication")
     if study.rule:
         rule = "selection" if study.selection else "precision"
         most = len(study.policies) * study.most_missions
-        per_cell += f" and more, up to {most:,} {study.replication_name}s, as {rule} asks"
+        per_cell += f" and more, up to {most:,} {name}s, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
     policies = format_count(len(study.policies), "policy")
     points = format_count(study.size, "design point")
     console.print_text(
-        f"{out}: {format_count(missions, study.replication_name)} of study {study.name} ({policies} "
+        f"{out}: {format_count(missions, name)} of study {study.name} ({policies} "
         f"x {points} x {per_cell})"
     )
     console.print_text(

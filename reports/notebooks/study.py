@@ -57,6 +57,7 @@ from dess.analysis.answers.settings.sobol import (
     sobol_indices_of,
     variance_sentence,
 )
+from dess.analysis.answers.settings.years import draw_calendar, year_table
 from dess.analysis.answers.summary import draw_performance
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.assumptions import assumption_facts
@@ -103,6 +104,9 @@ make_facts(answer.facts())
 # %% tags=["if-brief"]
 show_parts(page.draw_typical_mission(study))
 
+# %% tags=["if-years"]
+show_parts([draw_calendar(study, *page.shown_setting(study, by))])
+
 # %% tags=["if-missions"]
 page.make_panel_of(study, by)
 
@@ -121,16 +125,32 @@ show_parts(fleet_tables.fleet_table(study, by if metric else SUCCESS))
 # %% tags=["if-conditions"]
 show_parts(fleet_tables.condition_table(study))
 
-# %% [markdown] tags=["if-around"]
+# %% [markdown] tags=["if-around", "if-missions"]
 # ## What if
 #
 # One more UAV or pad, on the same missions.
+
+# %% [markdown] tags=["if-around", "if-years"]
+# ## What decides
+#
+# The night, each limit of the weather, the fleet and its speed: one change at a time, in the same
+# years.
 
 # %% tags=["if-around"]
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
 
+# %% tags=["if-around", "if-years"]
+show_parts([around.draw_ages(study)])
+
+# %% tags=["if-around"]
 show_parts(around.table_around(study), draw_falls(study))
+
+# %% [markdown] tags=["if-years"]
+# ## Year by year
+
+# %% tags=["if-years"]
+show_parts(year_table(study, *page.shown_setting(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -268,20 +288,20 @@ show_parts(
 # %% tags=["if-learned"]
 show_parts(summary.learner_table(study))
 
-# %% [markdown]
+# %% [markdown] tags=["if-missions"]
 # ## Single missions
 
-# %% tags=["if-answer"]
+# %% tags=["if-answer", "if-missions"]
 missions = missions_at_best(study, ranked)
 whose = f"every policy at its best setting by {called}"
 worst = summary.worst_missions(study, best["policy"], point=best["point"])
 
-# %% tags=["if-cheapest"]
+# %% tags=["if-cheapest", "if-missions"]
 missions = search.shown_missions
 whose = "the fleet of the answer"
 worst = summary.worst_missions(study, search.best.policy, point=search.shown_point)
 
-# %% tags=["if-ranked"]
+# %% tags=["if-ranked", "if-missions"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 show_parts(
     write_markdown("These figures show {whose}:", whose=whose),
@@ -289,7 +309,7 @@ show_parts(
     summary.quantile_table(spread, by),
 )
 
-# %% tags=["if-sensitivity"]
+# %% tags=["if-sensitivity", "if-missions"]
 worst = summary.worst_missions(study, summary.best_policy(study.missions))
 
 # %% tags=["if-missions"]

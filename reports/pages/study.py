@@ -22,6 +22,7 @@ from dess.analysis.answers.settings.points import (
     varied_values,
 )
 from dess.analysis.answers.settings.ranking import rank_settings, ranking_metric
+from dess.analysis.answers.settings.years import setting_with_oldest_data
 from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import map_figure
@@ -239,12 +240,11 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     manifest = results.store.manifest
     if manifest.processes:
         return Markdown(f"A page cannot simulate {manifest.functions}, which is Python.")
-    point, policy = 0, results.policies[0]
+    policy, point = shown_setting(results, metric)
     shown_search = None
     rule = results.study.selection
     if isinstance(rule, Cheapest):
         search = search_of(results)
-        point, policy = search.shown_point, search.best.policy
         fleet = ""
         if search.best.points:
             fleet = search.best.fleet
@@ -254,9 +254,6 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
             tolerance=rule.tolerance,
             indifference=rule.indifference,
         )
-    elif results.design != "saltelli":
-        best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
-        point, policy = int(best.point), best.policy
     space = results.scenario(point)
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     return make_panel(
@@ -271,6 +268,25 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         given=results.given_values(point),
         search=shown_search,
     )
+
+
+def shown_setting(results: Results, metric: str | None = None) -> tuple[str, int]:
+    """The policy and the design point that the page shows more of: those of the answer.
+
+    Args:
+        results: The study.
+        metric: The metric that ranks the settings, if it is not that of the study.
+    """
+    if isinstance(results.study.selection, Cheapest):
+        search = search_of(results)
+        if results.study.years and search.best.points:
+            points = search.best.points
+            return search.best.policy, setting_with_oldest_data(results, search.best.policy, points)
+        return search.best.policy, search.shown_point
+    if results.design == "saltelli":
+        return results.policies[0], 0
+    best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
+    return str(best.policy), int(best.point)
 
 
 def draw_typical_mission(results: Results) -> list[Drawing]:
@@ -350,5 +366,6 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-brief": has_missions and is_search and all(space.units for space in manifest.scenarios),
         # Replications are missions, which can be looked at one by one.
         "if-missions": has_missions,
+        "if-years": not has_missions,
         "if-around": is_search and around.is_known(results),
     }

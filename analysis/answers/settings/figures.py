@@ -430,8 +430,8 @@ def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
     for field, pairs in compare_values_by_field(results, table).items():
         data = table[table["field"] == field]
         caption = (
-            f"n = {counted_replications(results, data)} per point; bars are {INTERVALS}. The lowest "
-            "panel shows the paired difference from the first value, with an axis of its own: "
+            f"n = {counted_replications(results, data)} per point; bars are {INTERVALS}. The "
+            "lowest panel shows the paired difference from the first value, on an axis of its own: "
             f"{BARS}"
         )
         alt = f"The metrics against the {field_named(field).within}"

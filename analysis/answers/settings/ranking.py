@@ -27,6 +27,7 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
     varied_values,
 )
+from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
     AGE,
@@ -90,7 +91,10 @@ def best_setting_headline(results: Results, table: pd.DataFrame, metric: str) ->
     best = table.iloc[0]
     measure = metric_of(metric)
     name = setting_in_words(results, best["policy"], best["point"])
-    return f"The best is {name}: {measure.within} {measure.write(best[metric])}."
+    found = f"The best is {name}: {measure.within} {measure.write(best[metric])}."
+    if not results.study.years:
+        return found
+    return f"{found} {age_sentence(results, best['policy'], [best['point']])}"
 
 
 def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> list[Fact]:
@@ -111,6 +115,8 @@ def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> li
     facts = [Fact(each.within, _estimate(best, each)) for each in columns]
     name = results.study.replication_name
     facts.append(Fact("measured in", numbers.format_count(best["n"], name)))
+    if results.study.years:
+        facts += year_facts(results, policy, [point])
     facts.append(Fact("hardly served", hardly_served_nodes(results, policy, [point])))
     facts += _comparison_facts(results, table.iloc[1:])
     ends = ends_in_words(results, point, ends_of_point(results, point))
