@@ -43,6 +43,7 @@ from dess.analysis.tables import INTERVALS, Table
 from dess.policies.registry import is_path
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from dess.scenario.weather import ALWAYS
+from dess.scenario.weather.hours import State, hours_of
 
 FLEET = "the fleet"  # as it is, in tables and figures of its changes
 _ADDED = {"uavs": "one more UAV", "data_sheet.spares": "one more spare UAV"}
@@ -78,10 +79,11 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
     changes = []
     for change in _changed_fields(results.scenario(points[-1])):
         try:
-            load_scenario(scenario, **fixed | values | change)
+            changed = load_scenario(scenario, **fixed | values | change)
         except InputError:  # such as more pads than the zone has cells
             continue
-        changes.append(change)
+        if not changed.weather.is_on or (hours_of(changed).state == State.OPEN).any():
+            changes.append(change)
     varied = {*values, *(field for change in changes for field in change)}
     start = {field: value for field, value in (fixed | values).items() if field in varied}
     data = manifest.study.model_dump(
@@ -306,7 +308,7 @@ def _deciding_fact(results: Results) -> Fact:
     fleet = table["mean"][0]
     by_size = table[1:].sort_values("difference", key=abs, ascending=False, kind="stable")
     seen = by_size[(by_size["low"] > fleet) | (by_size["high"] < fleet)]
-    words = [f"{row.change} {write(row.mean)}" for row in seen.itertuples()]
+    words = [f"with {row.change} {write(row.mean)}" for row in seen.itertuples()]
     return Fact("what decides the age", f"{write(fleet)}; {', '.join(words)}" if words else "")
 
 
@@ -351,6 +353,4 @@ def change_in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
         return f"no limit of {removed}"
     if field == "pads":
         return pads_in_words(len(space.zone_pads), 1, value)
-    if field == "data_sheet.spares":
-        return numbers.format_count(value, "spare UAV")
     return field_named(field).words(value)

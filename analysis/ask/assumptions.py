@@ -157,7 +157,6 @@ def _weather_of(space: ScenarioSpace, wind: str) -> dict[str, str]:
         "operating": operating.get(weather.operating) or f"{weather.operating}, solar time",
         "window": f"open hours in a row, at most {weather.longest}, whose weather policy and "
         "return guard know beforehand; each move takes the most that it takes in one of its hours",
-        "late": f"what is on land more than {weather.due} after it was made",
         "lost UAVs": _replaced(space),
     }
 
@@ -173,6 +172,8 @@ def _replaced(space: ScenarioSpace) -> str:
 
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery."""
+    if space.weather.is_on:
+        return "what a slot takes follows from the winds of the window"
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "what a slot takes follows from the speed through the air"
     return battery_sentence(space)

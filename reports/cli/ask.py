@@ -65,7 +65,7 @@ def sweep(
         policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
             greedy]
         metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
-            what the scenario measures, such as age.  [default: product]
+            what the scenario measures, such as age.  [default: product, or age in years]
         missions: Missions per setting; with --require, additional missions that check each
             selected setting.
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for

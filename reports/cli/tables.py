@@ -25,6 +25,7 @@ from dess.analysis.metrics import (
     measured_in,
     metric_group,
     metric_of,
+    usual_metric,
 )
 from dess.analysis.names import field_named
 from dess.analysis.paper import values
@@ -77,7 +78,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         of_points = pd.DataFrame()
         if len(results.store.manifest.points) <= MANY_POINTS:
             of_points = summary.means_of_points(results)
-        _print_by_point(results, of_points, [PRODUCT])
+        _print_by_point(results, of_points, [ranking_metric(results)])
 
 
 def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
@@ -114,7 +115,7 @@ def print_details(
             the study selects by.
     """
     measured = measured_in({*frames["means"]["metric"]})
-    metrics = [*dict.fromkeys([ranking_metric(results), PRODUCT])]
+    metrics = [*dict.fromkeys([ranking_metric(results), usual_metric(results.missions)])]
     if everything:
         metrics = [*dict.fromkeys([*metrics, *METRICS, *measured])]
     printers = {
@@ -133,6 +134,8 @@ def print_details(
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
     }
+    if results.study.years:  # these are of single missions, or of the paper's metrics
+        printers = {name: printers[name] for name in ("costs", "means")}
     for name, print_rows in printers.items():
         if not frames[name].empty:
             print_rows(frames[name])

@@ -57,7 +57,7 @@ from dess.analysis.answers.settings.sobol import (
     sobol_indices_of,
     variance_sentence,
 )
-from dess.analysis.answers.settings.years import draw_calendar, year_table
+from dess.analysis.answers.settings.years import year_table
 from dess.analysis.answers.summary import draw_performance
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.assumptions import assumption_facts
@@ -105,7 +105,7 @@ make_facts(answer.facts())
 show_parts(page.draw_typical_mission(study))
 
 # %% tags=["if-years"]
-show_parts([draw_calendar(study, *page.shown_setting(study, by))])
+show_parts(page.draw_years(study, by))
 
 # %% tags=["if-missions"]
 page.make_panel_of(study, by)
@@ -134,14 +134,11 @@ show_parts(fleet_tables.condition_table(study))
 # ## What decides
 #
 # The night, each limit of the weather, the fleet and its speed: one change at a time, in the same
-# years.
+# years, as in the figure above.
 
 # %% tags=["if-around"]
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
-
-# %% tags=["if-around", "if-years"]
-show_parts([around.draw_ages(study)])
 
 # %% tags=["if-around"]
 show_parts(around.table_around(study), draw_falls(study))
@@ -182,9 +179,10 @@ show_parts(
 )
 
 # %% tags=["if-one-setting"]
+of_policies = metrics if study.study.years else METRICS
 show_parts(
-    (draw_performance(study, of) for of in METRICS),
-    tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, METRICS)),
+    (draw_performance(study, of) for of in of_policies),
+    tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, of_policies)),
     write_markdown("{weights}", weights=summary.weights_in_words(study)),
 )
 

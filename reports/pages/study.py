@@ -22,7 +22,7 @@ from dess.analysis.answers.settings.points import (
     varied_values,
 )
 from dess.analysis.answers.settings.ranking import rank_settings, ranking_metric
-from dess.analysis.answers.settings.years import setting_with_oldest_data
+from dess.analysis.answers.settings.years import draw_calendar, setting_with_oldest_data
 from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import map_figure
@@ -141,7 +141,7 @@ def shown_metrics(results: Results, by: str) -> list[str]:
     asked = [requirement.column for requirement in requirements_of(results)]
     if asked:
         return [*dict.fromkeys([by, *asked])]
-    return metrics_of_page(by)
+    return metrics_of_page(results, by)
 
 
 def list_guarantees(results: Results) -> Marked:
@@ -289,6 +289,18 @@ def shown_setting(results: Results, metric: str | None = None) -> tuple[str, int
     return str(best.policy), int(best.point)
 
 
+def draw_years(results: Results, metric: str | None = None) -> Iterator[Drawing]:
+    """The calendar of the years of the answer, and what decides the age of its data if known.
+
+    Args:
+        results: A study of years.
+        metric: As for ``shown_setting``.
+    """
+    yield draw_calendar(results, *shown_setting(results, metric))
+    if isinstance(results.study.selection, Cheapest) and around.is_known(results):
+        yield around.draw_ages(results)
+
+
 def draw_typical_mission(results: Results) -> list[Drawing]:
     """The map of a typical mission of the cheapest fleet, with the names of its nodes.
 
@@ -351,9 +363,10 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         # Design points spread over the space of parameters.
         "if-sampled": kind == "latin-hypercube" or (kind == "table" and fields > 2),
         "if-sensitivity": not is_ranked,
-        # Several policies with the same missions; some of them learned, some not.
-        "if-policies": summary.has_policies_to_compare(results),
-        "if-learned": summary.has_learned_to_compare(results),
+        # Several policies with the same missions, not years, which are compared by the paper's
+        # metrics; some of them learned, some not.
+        "if-policies": has_missions and summary.has_policies_to_compare(results),
+        "if-learned": has_missions and summary.has_learned_to_compare(results),
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,

@@ -30,7 +30,6 @@ from dess.analysis.answers.settings.points import (
 from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
-    AGE,
     COST,
     HOME,
     PRODUCT,
@@ -42,6 +41,7 @@ from dess.analysis.metrics import (
     metric_of,
     metrics_in,
     ranking_column,
+    usual_metric,
 )
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
@@ -67,16 +67,13 @@ MOST_NAMES = 3  # the largest number of settings that are named because they may
 
 
 def ranking_metric(results: Results, metric: str | None = None) -> str:
-    """The metric that ranks the settings: the given one, that of the selection, or the product.
-
-    Of years it is the age of information: their collection ratio tends to 1.
+    """The metric that ranks the settings: the given one, that of the selection, or the usual one.
 
     Raises:
         InputError: If there is no such metric.
     """
     if metric is None:
-        usual = AGE if results.study.years else PRODUCT
-        metric = getattr(results.study.selection, "metric", usual)
+        metric = getattr(results.study.selection, "metric", usual_metric(results.missions))
     return ranking_column(metric, results.missions)
 
 
@@ -337,6 +334,6 @@ def best_of_policies_table(results: Results, metric: str) -> Table:
 def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Rows of ``rank_settings`` as text."""
     cells = named_cells(results, rows)
-    for measure in map(metric_of, with_way_home(results, metrics_of_page(metric))):
+    for measure in map(metric_of, with_way_home(results, metrics_of_page(results, metric))):
         cells[measure.name] = numbers.format_estimates(rows, measure.column, measure.written)
     return cells.assign(**{results.replications_head: format_counts(rows["n"])})

@@ -256,7 +256,7 @@ def with_missions(answer, before, after, ratios):
 def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(answer):
     before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
     made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
-    differences = found.product_differences(made.results, "greedy").tolist()
+    differences = found.paired_differences(made.results, "greedy").tolist()
     assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
     assert (made.variation.typical().replication, made.variation.worst().replication) == (1, 4)
     even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
@@ -332,7 +332,7 @@ def test_captions_say_what_the_figures_show(answer):
                 assert f"({found.format_change(row)}" in sentence
     for policy in answer.results.policies:
         share = numbers.format_percent(
-            (found.product_differences(answer.results, policy) > 0).mean()
+            (found.paired_differences(answer.results, policy) > 0).mean()
         )
         assert f"higher in {share} and lower in" in variation.spread_in_words()
     never = answer.table().query("low == high == 0").iloc[0]
