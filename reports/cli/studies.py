@@ -230,7 +230,7 @@ def _show_comparison(
     """Show how every design point differs from one of them, with the same policy."""
     from dess.analysis import numbers
     from dess.analysis.answers.settings import baseline
-    from dess.analysis.metrics import METRICS, PRODUCT, measured_in
+    from dess.analysis.metrics import METRICS, measured_in, usual_metric
     from dess.reports.cli import tables as printed
 
     metrics = [*METRICS, *measured_in(results.missions)]
@@ -244,7 +244,7 @@ def _show_comparison(
         print(json.dumps(about | {"compared": rows}, indent=2))
         return
     console.print_text(f"against {baseline.baseline_in_words(results, point)}")
-    for metric in metrics if everything else [PRODUCT]:
+    for metric in metrics if everything else [usual_metric(results.missions)]:
         printed.print_table_with_caption(baseline.baseline_table(results, point, metric))
 
 
