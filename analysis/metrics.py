@@ -503,6 +503,7 @@ def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
     A time may be as long as the mission (``MOST_SLOTS``), a wait as long as somebody can wait
     (``MOST_WAITING``), and where no UAV can, there is no queue. A cost has the range of
     ``LEAST_COST`` and ``MOST_COST``. No more data can be collected, or left, than both together.
+    No value is above what a column named ``most_`` and the metric says, as of what cannot happen.
 
     Args:
         missions: The missions. Of a column that they lack, nothing is known.
@@ -511,6 +512,19 @@ def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
     Returns:
         (n,) arrays, or numbers that are those of all missions.
     """
+    least, most = _ranges_by_metric(missions, column)
+    if (limit := limit_of(column)) in missions:
+        most = np.minimum(most, np.asarray(missions[limit], float))
+    return least, most
+
+
+def limit_of(column: str) -> str:
+    """The column of the largest value that a metric can have in each mission, if there is one."""
+    return f"most_{column}"
+
+
+def _ranges_by_metric(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
+    """The least and the largest value of a metric by its kind, as ``ranges_of_missions``."""
     metric = metric_of(column)
     if metric.kind == "cost" and MOST_COST in missions:
         return np.asarray(missions[LEAST_COST]), np.asarray(missions[MOST_COST])

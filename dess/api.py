@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from dess.base.floors import check_floors
-from dess.model import batch, mission
+from dess.model import batch, mission, years
 from dess.model.record import MissionRecord, Records
+from dess.model.state import spaces_of
 from dess.scenario.scenario import AnyScenario, loaded
 from dess.scenario.weather import refuse_weather
 
@@ -22,6 +23,7 @@ def simulate(
     *,
     events: bool = False,
     processes: Sequence[mission.Process] = (),
+    window: str | None = None,
 ) -> MissionRecord:
     """Simulate one mission with the SimPy model.
 
@@ -34,6 +36,8 @@ def simulate(
         replication: Number of the replication.
         events: Whether to keep the event log.
         processes: Further processes, functions of the ``Mission`` that yield SimPy events.
+        window: With weather, the hour [UTC] in which a window begins, such as ``2013-02-09T14``:
+            the window is simulated in its year, and there is no replication.
 
     Returns:
         The record of the mission.
@@ -46,8 +50,14 @@ def simulate(
     """
     team = load_policies(policy)
     scenario = loaded(scenario)
+    starts = None
+    if window is not None:
+        begin = years.start_of_window(spaces_of([scenario])[0], team, seed, window)
+        scenario, starts, replication = begin
     refuse_weather([scenario.weather])
-    return mission.simulate(scenario, team, seed, replication, events=events, processes=processes)
+    return mission.simulate(
+        scenario, team, seed, replication, events=events, processes=processes, starts=starts
+    )
 
 
 def simulate_batch(

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from hypothesis import is_hypothesis_test, settings
+from hypothesis import Phase, is_hypothesis_test, settings
 
 from tests.installed import installed
 
@@ -53,6 +53,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # by a shell, for jobs in
 
 settings.register_profile("default", max_examples=30, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
+# Of a planted fault (benchmarks/faults.py), it is enough to know that it is caught.
+FIRST = (Phase.explicit, Phase.generate)
+settings.register_profile("planted", settings.get_profile("default"), phases=FIRST)
 settings.load_profile("default")
 
 

@@ -269,6 +269,7 @@ def sheet_spaces(draw: st.DrawFn) -> ScenarioSpace:
         "data_rate": draw(st.sampled_from(["0 B/h", "20 kB/h", "3 MB/h", "90 MB/h"])),
         "message": draw(st.sampled_from(["100 B", "1 kB", "2 MB"])),
         "backlog": draw(st.sampled_from(["0 B", "5 MB"])),
+        "idle": draw(st.sampled_from([None, "1 h", "16 h"])),
         "snr": f"{draw(st.integers(-20, 20))} dB at {draw(st.integers(1, 3))} km",
         "altitude": f"{draw(st.integers(1, 500))} m",
         "duty_cycle": draw(st.sampled_from(["1 %", "100 %"])),

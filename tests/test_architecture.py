@@ -25,6 +25,8 @@ ROOMS = {
             "model.view",
             "model.guard",
             "model.reach",
+            "model.campaign",
+            "model.years",
             "model.batch",
         ),
         *("model.mission", "model.processes"),

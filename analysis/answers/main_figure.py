@@ -2,6 +2,7 @@
 
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.fleet.requirements import requirements_of
+from dess.analysis.answers.policies.performance import draw_performance
 from dess.analysis.answers.settings.figures import (
     draw_curves,
     draw_main_effects,
@@ -10,7 +11,6 @@ from dess.analysis.answers.settings.figures import (
 )
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.settings.sobol import draw_indices
-from dess.analysis.answers.summary import draw_performance
 from dess.analysis.figures import Drawing
 from dess.analysis.results.tables import Results
 

@@ -7,6 +7,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers import summary
+from dess.analysis.answers.policies import ranks
 from dess.analysis.metrics import BOUND, GAP, PRODUCT
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.tables import Results, load_results
@@ -91,7 +92,7 @@ def in_words(results: Results, policy: str | None = None) -> str:
         results: A study with bounds.
         policy: The policy; by default the best of the study.
     """
-    policy = policy or summary.best_policy(results.missions)
+    policy = policy or ranks.best_policy(results.missions)
     table = by_fleet(results)
     useful = fleets_with_useful_bound(table)
     rows = useful[useful["policy"] == policy]

@@ -20,6 +20,7 @@ from scipy.special import ndtri
 from dess.analysis import numbers
 from dess.analysis.answers import summary
 from dess.analysis.answers.missions import end_in_words, estimate_metric
+from dess.analysis.answers.policies import ranks
 from dess.analysis.answers.settings.home import with_way_home
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
@@ -35,6 +36,7 @@ from dess.analysis.metrics import (
     columns_in_units,
     format_length,
     in_either,
+    limit_of,
     measured_in,
     metric_of,
     usual_metric,
@@ -100,7 +102,10 @@ _MISSION = ["policy", "point", "replication"]
 
 @compute_once
 def missions_of(results: Results) -> pd.DataFrame:
-    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail."""
+    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail.
+
+    There, none can (``metrics.limit_of``), so that the other side cannot have less.
+    """
     uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
     sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
     missions = results.missions.join(sums, on=_MISSION)
@@ -112,8 +117,12 @@ def missions_of(results: Results) -> pd.DataFrame:
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
     if units:
-        return sides.assign(**columns_in_units(sides, units))
-    return sides
+        sides = sides.assign(**columns_in_units(sides, units))
+    limits: dict[str, np.ndarray] = {}
+    for name in fillable:
+        most = np.where(missions[name].isna(), 0.0, np.inf)
+        limits |= {limit_of(column): most for column in in_either(name) if column in sides}
+    return sides.assign(**limits)
 
 
 def measured_columns(results: Results) -> list[str]:
@@ -227,7 +236,7 @@ def paired_differences(results: Results, policy: str, metric: str = PRODUCT) -> 
 def best_policy_of_side(results: Results, point: int) -> str:
     """The best policy on one side, by ``summary.best_policy``."""
     missions = results.missions
-    return summary.best_policy(missions[missions["point"] == point])
+    return ranks.best_policy(missions[missions["point"] == point])
 
 
 def _missing_in_words(answer: Any) -> str:

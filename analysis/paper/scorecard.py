@@ -12,7 +12,7 @@ import pandas as pd
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers import summary
+from dess.analysis.answers.policies import ranks
 from dess.analysis.answers.training.transfer import BAND_LEVEL
 from dess.analysis.paper import measures, rules, values
 from dess.analysis.paper.rules import MARGIN, NEAR
@@ -321,7 +321,7 @@ def _evidence_of_policy(
     if len(among) == 1:
         best = among[0]
     else:
-        best = summary.best_policy(results.missions, among)
+        best = ranks.best_policy(results.missions, among)
     return measures.EvidenceOfPolicy(results, best)
 
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import pandas as pd
 from scipy.special import stdtrit
 
-from dess.analysis.answers import summary
+from dess.analysis.answers import decided, summary
+from dess.analysis.answers.policies import performance, ranks
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results
@@ -76,7 +77,7 @@ def printed_intervals(results: Results, name: str) -> dict[str, Interval]:
         missions = results.checks
     if missions.empty:
         return exact(printed)
-    best = summary.best_policy(missions)
+    best = ranks.best_policy(missions)
     variance = float(missions.loc[missions["policy"] == best, RATIO].var())
     return intervals_of_means(printed, MISSIONS[name], variance)
 
@@ -121,11 +122,11 @@ def best_settings_table(results: Results) -> pd.DataFrame:
     """A table with a row for the paper and a row per policy: its best setting and its check."""
     checks = {(row.policy, row.metric): row for row in summary.means_of_check(results).itertuples()}
     paper = printed_intervals(results, "sweet-spot")
-    printed = {name: summary.format_printed(paper[metric]) for metric, name in METRICS.items()}
+    printed = {name: performance.format_printed(paper[metric]) for metric, name in METRICS.items()}
     rows = [{"Policy": "paper", **dict.fromkeys(setting_in_symbols(results, 0), ""), **printed}]
-    for row in summary.selected_settings(results).itertuples():
+    for row in decided.selected_settings(results).itertuples():
         means = {
-            name: summary.format_with_mark(checks[row.policy, metric], paper[metric])
+            name: performance.format_with_mark(checks[row.policy, metric], paper[metric])
             for metric, name in METRICS.items()
             if checks
         }

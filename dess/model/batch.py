@@ -203,7 +203,7 @@ def _run_years(spaces, team, source, batch_size, records, progress, stopped) -> 
     size = min(batch_size, most_places(spaces, world.chart))
     for part in np.array_split(jobs, -(-len(jobs) // size)):
         campaigns = [Campaign(spaces[which[job]], seed, int(numbers[job])) for job in part]
-        Years(campaigns, world).run(team, records, part, progress, stopped)
+        Years(campaigns, world).run(team, records, part.tolist(), progress, stopped)
 
 
 @kernel

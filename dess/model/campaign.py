@@ -28,11 +28,12 @@ from dess.model.rules import draw_idle_data
 from dess.model.state import BATTERY, LOST, Starts, State, constants_of, types_of
 from dess.physics import streams
 from dess.physics.charging import charge_limit, charged_after, slots_to_charge
-from dess.physics.energy import ACTIONS, SPEEDS
+from dess.physics.energy import ACTIONS, SPEEDS, Consumption
 from dess.physics.fleet import slowest
 from dess.scenario.fields import SAMPLED
 from dess.scenario.quantities import measured
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather import Weather
 from dess.scenario.weather.hours import State as HourState
 from dess.scenario.weather.hours import Year, hours_of, years
 from dess.scenario.weather.windows import windows_of
@@ -224,7 +225,7 @@ class Campaign:
         repair_in_gap(mission, number, gap, self.silent, grounded)
         for uav, is_grounded in zip(self.fleet, grounded, strict=True):
             uav.state["grounded"] = is_grounded
-        self._charge(gap)
+        self.charge(gap)
         awaited = [arrives for arrives in self.ordered if arrives > begin]
         self.spares += len(self.ordered) - len(awaited)
         self.ordered = awaited
@@ -254,7 +255,7 @@ class Campaign:
                     return True
         return False
 
-    def _charge(self, gap: float) -> None:
+    def charge(self, gap: float) -> None:
         """Charge the UAVs for so many slots, on the working pads of the zones where they stand.
 
         They are charged one after the other, the lowest battery first.
@@ -306,6 +307,20 @@ class Campaign:
         starts.ages[b] = (self.clock - self.emptied) / self.slot
         starts.silent[b] = self.silent
         self._count_closed(begin)
+
+    def scenario_of_window(self) -> ScenarioSpace:
+        """The scenario of the next window, as a mission without weather."""
+        window = self.plan.windows[self.next]
+        rows = window.costs[: slowest(self.space.fleet)].tolist()
+        costs = tuple((north, east, south, west, hover) for north, east, south, west, hover in rows)
+        return self.space.model_copy(
+            update={
+                "weather": Weather.off(),
+                "data_sheet": self.space.data_sheet.model_copy(update={"horizon": None}),
+                "max_slots": int(window.hours * HOUR / self.slot + 1e-9),
+                "consumption": Consumption(slots=costs),
+            }
+        )
 
     def end_window(self, record: MissionRecord, state: State, b: int) -> None:
         """Take over what the window of mission ``b`` has ended with."""
@@ -499,9 +514,9 @@ def repair_in_gap(mission, number, gap, silent, grounded):
 @inlined
 def _is_repaired(mission, number, gap, stream, index, probability):
     """Whether a repair ends within so many slots, of which each ends it with a probability."""
-    if probability <= 0.0:
+    if probability <= 0.0 or gap <= 0.0:
         return False
-    stays = 1.0
+    stays = 0.0
     if probability < 1.0:
         stays = exp(gap * log(1.0 - probability))
     words = streams.block(mission.seed, number, stream, 1, 0, index)

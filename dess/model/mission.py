@@ -51,7 +51,7 @@ from dess.model.channel import empty_scratch, world_of
 from dess.model.events import Listener, LogWriter, check_own_event
 from dess.model.packets import Packets
 from dess.model.record import MissionRecord, empty_records_of, write_records
-from dess.model.state import LOST, check_seed, spaces_of, starts_of, state_of
+from dess.model.state import LOST, Starts, check_seed, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
 from dess.model.ways import Ways
 from dess.physics.charging import may_change_order, queue_key
@@ -77,6 +77,7 @@ def simulate(
     *,
     events: bool = False,
     processes: Sequence["Process"] = (),
+    starts: Starts | None = None,
 ) -> MissionRecord:
     """Simulate one mission with the SimPy model.
 
@@ -88,6 +89,8 @@ def simulate(
         replication: Number of the replication.
         events: Whether to keep the event log.
         processes: Further processes, functions of the ``Mission`` that yield SimPy events.
+        starts: What the mission starts from, of a window of a year with weather
+            (``dess.model.years.start_of_window``); by default what the scenario says.
 
     Returns:
         The record of the mission.
@@ -101,7 +104,9 @@ def simulate(
     check_seed(seed, replication)
     space = spaces_of([scenario])[0]
     team = team_of(policy, [space])
-    mission = Mission(space, team, seed, replication, events=events, processes=processes)
+    mission = Mission(
+        space, team, seed, replication, events=events, processes=processes, starts=starts
+    )
     return mission.run()
 
 
@@ -184,12 +189,13 @@ class Mission:
         *,
         events: bool = False,
         processes: Sequence["Process"] = (),
+        starts: Starts | None = None,
     ):
         self.scenario = scenario
         self.policies = policies
         self.world = world_of(scenario)
         self.shown_world = self.world.shown()  # what policies may see of it
-        starts = starts_of([scenario], seed)
+        starts = starts or starts_of([scenario], seed)
         self.state = state_of([scenario], 1)
         self.ways = Ways(starts.constants, self.world.chart)
         rules.launch(self.state, 0, starts, 0, replication)

@@ -10,28 +10,93 @@ share a sea are advanced in lockstep, as the missions of ``simulate_batch`` are.
 
 from collections.abc import Callable, Sequence
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dess.base.errors import InputError, shown
 from dess.base.kernels import kernel
 from dess.model import rules
-from dess.model.campaign import Campaign
-from dess.model.channel import World, empty_scratch
+from dess.model.campaign import MOST_HOURS, Campaign, check_years, years_of
+from dess.model.channel import World, empty_scratch, world_of
 from dess.model.record import Records, empty_records, write_records
-from dess.model.state import starts_of, state_of
+from dess.model.state import Starts, starts_of, state_of
 from dess.model.view import decide
 from dess.model.ways import MOST_ENTRIES, WaysOfPlaces
 from dess.physics.chart import Chart
 from dess.physics.fleet import slowest
 from dess.physics.landing import is_over
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather.hours import hours_of
 
 
 def most_places(spaces: Sequence[ScenarioSpace], chart: Chart) -> int:
     """How many places have room in memory for their tables of ways."""
     speeds = max(slowest(space.fleet) for space in spaces)
     return max(MOST_ENTRIES // (len(chart.parking) * speeds * chart.zones.size), 1)
+
+
+class WindowStart(NamedTuple):
+    """A window of a year, as a mission that can be simulated by itself.
+
+    Attributes:
+        scenario: Its scenario, without weather.
+        starts: What it starts from: one row.
+        replication: The number of its replication.
+    """
+
+    scenario: ScenarioSpace
+    starts: Starts
+    replication: int
+
+
+def start_of_window(
+    space: ScenarioSpace, team: Sequence[Any], seed: int, window: str
+) -> WindowStart:
+    """What a window of the weather of a scenario starts from, in the year of a study.
+
+    Its year is simulated up to there, since it begins with what the windows before have left.
+
+    Args:
+        space: The scenario, with weather.
+        team: The policies.
+        seed: Seed of the study.
+        window: The hour in which it begins [UTC], such as ``2013-02-09T14``.
+
+    Raises:
+        InputError: If no window begins then, or no UAV is there; if there is no weather.
+    """
+    if not space.weather.is_on:
+        raise InputError("window", "is of a year with weather", "a scenario with weather")
+    check_years([space], np.zeros(0, np.int64))
+    begin = _hour_of(window)
+    hour = int((begin - hours_of(space).first).astype(np.int64))
+    order = years_of(space, seed)
+    replications = [r for r, y in enumerate(order) if y.first <= hour < y.first + y.hours]
+    if not replications:
+        problem = f"{window} is in no whole year of the weather"
+        raise InputError("window", problem, "an hour of one")
+    (replication,) = replications
+    year = order[replication]
+    campaign = Campaign(space, seed, replication)
+    firsts = [window.first for window in campaign.plan.windows]
+    if hour - year.first not in firsts:
+        near = sorted(firsts, key=lambda first: abs(first - (hour - year.first)))[:3]
+        begins = [str(begin + first + year.first - hour) for first in near]
+        raise InputError("window", f"none begins at {window}", f"such as {', '.join(begins)}")
+    years = Years([campaign], world_of(space))
+    number = years.run_to(team, firsts.index(hour - year.first))
+    if number < 0:
+        raise InputError("window", f"no UAV is there at {window}", "a window with a UAV")
+    return WindowStart(campaign.scenario_of_window(), years.starts, number)
+
+
+def _hour_of(text: str) -> np.datetime64:
+    """The hour that a text names [UTC]."""
+    try:
+        return np.datetime64(text.removesuffix("Z"), "h")
+    except ValueError:
+        raise InputError("window", f"{shown(text)} is no time", "such as 2013-02-09T14") from None
 
 
 class Years:
@@ -69,16 +134,40 @@ class Years:
         """
         for b in range(len(self.campaigns)):
             self._begin_window(b)
+        self._fly(team, progress, stopped)
+        for campaign, row in zip(self.campaigns, rows, strict=True):
+            campaign.end_year(records, row)
+
+    def run_to(self, team: Sequence[Any], window: int) -> int:
+        """Simulate the only year up to the start of one of its windows, by its number in the plan.
+
+        Returns:
+            The number of its replication, or -1 if no UAV is there to fly it.
+        """
+        (campaign,) = self.campaigns
+        self._begin_window(0)
+        self._fly(team, until=window)
+        number = MOST_HOURS * campaign.replication + campaign.plan.windows[window].first
+        return number if campaign.next == window and self.has_window[0] else -1
+
+    def _fly(
+        self,
+        team: Sequence[Any],
+        progress: Callable[[int], object] | None = None,
+        stopped: Event | None = None,
+        until: int | None = None,
+    ) -> None:
+        """Advance all years until they end, or until one begins a window of this number."""
         shown = self.world.shown()
         while self.has_window.any() and not (stopped and stopped.is_set()):
+            if until is not None and self.campaigns[0].next >= until:
+                return
             decide(team, self.state, shown, self.ways)  # type: ignore[arg-type]
             for b in _advance(self.has_window, self.state, self.world, self.scratch):
                 self._end_window(b)
                 self._begin_window(b)
                 if progress and not self.has_window[b]:
                     progress(1)
-        for campaign, row in zip(self.campaigns, rows, strict=True):
-            campaign.end_year(records, row)
 
     def _begin_window(self, b: int) -> None:
         """Launch the next window of a place, if its year has one."""

@@ -223,7 +223,7 @@ def _ask_around(
 ) -> None:
     """Ask what one more UAV or pad brings to the cheapest fleet, and what the fleet bears."""
     from dess.analysis.ask.around import question_around
-    from dess.analysis.ask.limits import find_limits
+    from dess.analysis.ask.limit_search import find_limits
 
     scenario = question.study.scenario
     if question.study.selection and (changes := question_around(results, scenario)):
@@ -256,7 +256,7 @@ def _print_answer(
             print_facts(assumed)
         console.print_text(f"study: {question.file}")
     page = None
-    absent = missing("reports", f"the page of a {asked}")
+    absent: object = missing("reports", f"the page of a {asked}")
     if question.study.years and asked == WHAT_IF_QUESTION:
         absent = "it draws single missions, and these are years"
     if absent:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.analysis.flights.separation import Separation
     from dess.model.record import MissionRecord
+    from dess.model.state import Starts
     from dess.policies.registry import Policy
     from dess.scenario.own_sea import Positions
     from dess.scenario.scenario import Scenario, ScenarioSpace
@@ -53,6 +54,7 @@ def simulate(
     ] = None,
     seed: options.SeedOption = 0,
     replication: int | None = None,
+    window: Annotated[str | None, typer.Option(metavar="HOUR")] = None,
     of: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     point: int | None = None,
     events: Annotated[Path | None, typer.Option(metavar="FILE.parquet")] = None,
@@ -74,6 +76,9 @@ def simulate(
             the study]
         replication: Number of the replication, which selects the random draws.  [default: 0, or
             the first of the design point]
+        window: With weather: simulate the window that begins in this hour (UTC), such as
+            2013-02-09T14, as a mission that begins with what its year has left. It takes the place
+            of --replication.
         of: Simulate a mission of this results folder again, with its scenario and seed.
         point: With --of: number of the design point, from 0.
         events: Write the event log of the mission into this file, .parquet or .csv; - for
@@ -105,8 +110,15 @@ def simulate(
         asked = _read_scenario(
             scenario, settings, policy, seed, replication, options.typed_processes(process)
         )
+    if window is not None and replication is not None:
+        raise InputError("--window", "is given beside --replication", "either")
     if not yes:
         check_missions("simulate", [asked.space])
+    if plan is not None:
+        asked = asked.without_swaps()
+    if window is not None:
+        with console.compile_notice():
+            asked = asked.in_window(window)
     check_seed(asked.seed, asked.replication)
     outputs = _Outputs(events, figure, animation, path, plan)
     outputs.check_degrees(asked.space)
@@ -115,7 +127,6 @@ def simulate(
     positions = None
     if plan is not None:
         positions = _prepare_plan(plan, asked, settings)
-        asked = asked.without_swaps()
     outputs.check_files(as_json)
     with console.open_outputs(outputs.files) as temporaries, _open_folder(plan) as folder:
         mission = _simulate(asked, outputs.need_log or not as_json, separation, begin)
@@ -146,6 +157,21 @@ class _Asked:
     scenario: str
     study: str = ""
     point: int | None = None
+    window: str | None = None
+    starts: "Starts | None" = None
+
+    def in_window(self, window: str) -> "_Asked":
+        """The window of the weather that begins in an hour."""
+        from dess.model.years import start_of_window
+
+        start = start_of_window(self.space, self.team, self.seed, window)
+        return replace(
+            self,
+            space=start.scenario,
+            replication=start.replication,
+            window=window,
+            starts=start.starts,
+        )
 
     def without_swaps(self) -> "_Asked":
         """The same in a sea in which UAVs do not swap their cells."""
@@ -158,7 +184,10 @@ class _Asked:
         where = f"scenario {Path(self.scenario).stem}"
         if self.point is not None:
             where = f"study {self.study}, point {self.point}"
-        return f"{self.policy}, {where}, replication {self.replication} of seed {self.seed}"
+        which = f"replication {self.replication}"
+        if self.window:
+            which = f"the window of {self.window}"
+        return f"{self.policy}, {where}, {which} of seed {self.seed}"
 
     @property
     def names(self) -> dict[str, Any]:
@@ -167,6 +196,8 @@ class _Asked:
             shown += ["study", "point"]
         if self.processes:
             shown.append("processes")
+        if self.window:
+            shown.append("window")
         return {name: getattr(self, name) for name in shown}
 
 
@@ -286,14 +317,23 @@ def _simulate(
     asked: _Asked, has_log: bool, separation: "Separation", start: datetime | None
 ) -> "_MissionToWrite":
     """Simulate the mission."""
-    from dess import simulate
+    from dess.model.mission import simulate
     from dess.model.processes import load_processes
     from dess.model.state import sample_scenario
+    from dess.scenario.weather import refuse_weather
 
     which = asked.seed, asked.replication
     processes = load_processes(asked.processes)
     with console.compile_notice():
-        record = simulate(asked.space, asked.team, *which, events=has_log, processes=processes)
+        refuse_weather([asked.space.weather])
+        record = simulate(
+            asked.space,
+            asked.team,
+            *which,
+            events=has_log,
+            processes=processes,
+            starts=asked.starts,
+        )
     drawn = sample_scenario(asked.space, *which)
     return _MissionToWrite(record, drawn, asked.title, separation, start)
 

@@ -311,26 +311,28 @@ def _make_tables(
     """All tables, by their names in the JSON."""
     import pandas as pd
 
-    from dess.analysis.answers import optimality, summary
+    from dess.analysis.answers import decided, distributions, optimality, summary
     from dess.analysis.answers.fleet.costs import cost_front
+    from dess.analysis.answers.policies import comparisons, ranks
     from dess.analysis.answers.settings.sobol import sobol_indices_of
+    from dess.analysis.answers.worst_missions import worst_missions
 
-    policy = policy or summary.best_policy(results.missions)
+    policy = policy or ranks.best_policy(results.missions)
     costs = pd.DataFrame()
     if results.study.costs:
         costs = cost_front(results)
     return {
         "means": means,
-        "distributions": summary.product_distributions(results),
-        "precisions": summary.reached_precisions(results),
-        "comparisons": summary.compare_with_best(results),
-        "learned_against_heuristic": summary.compare_learned_with_heuristic(results),
+        "distributions": distributions.product_distributions(results),
+        "precisions": decided.reached_precisions(results),
+        "comparisons": comparisons.compare_with_best(results),
+        "learned_against_heuristic": comparisons.compare_learned_with_heuristic(results),
         "sensitivities": sobol_indices_of(results),
         "costs": costs,
-        "selected": summary.selected_settings(results),
+        "selected": decided.selected_settings(results),
         "gaps": optimality.by_fleet(results),
         "checks": summary.means_of_check(results),
-        "worst": summary.worst_missions(results, policy, worst, folder=folder),
+        "worst": worst_missions(results, policy, worst, folder=folder),
     }
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.answers import diff, optimality, summary
+from dess.analysis.answers import decided, diff, distributions, optimality, summary
 from dess.analysis.answers.fleet.costs import setting_cells
+from dess.analysis.answers.policies import comparisons
 from dess.analysis.answers.settings.points import points_in_words, setting_in_words
 from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.answers.settings.sobol import index_table
@@ -57,7 +58,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         console.print_text(f" accepted: {change.text}")
     printed = values.PRINTED.get(study.name, {})
     if study.selection:
-        selected = summary.selected_settings(results)
+        selected = decided.selected_settings(results)
         _print_selections(selected)
         is_search = "condition" in selected
         if is_search and study.costs:
@@ -193,7 +194,7 @@ def _print_selections(selected: pd.DataFrame) -> None:
     cells["missions"] = format_counts(cells["missions"])
     if "metric" in selected:
         measure = metric_of(selected["metric"].iloc[0])
-        cells[measure.head] = summary.selected_by_cells(selected)
+        cells[measure.head] = decided.selected_by_cells(selected)
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         console.print_text(f" {guarantee}")
@@ -213,7 +214,7 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
 
 def _print_precisions(results: Results, table: pd.DataFrame) -> None:
     """The precision of each estimate beside its target, with the design points in words."""
-    cells = summary.precision_table(table, most=None).cells
+    cells = decided.precision_table(table, most=None).cells
     points = points_in_words(results)
     cells["Point"] = cells["Point"].map(points.__getitem__)
     _print_titled("precision:", cells)
@@ -315,7 +316,8 @@ def _print_distributions(table: pd.DataFrame) -> None:
     """Quantiles of the product over the missions, and the mean of the worst ones."""
     rows = table[(table["view"] != "quantile") | table["share"].isin(_QUANTILES)]
     print_frame(
-        "spread of the product", summary.quantile_table(rows, PRODUCT).cells.set_index("Policy")
+        "spread of the product",
+        distributions.quantile_table(rows, PRODUCT).cells.set_index("Policy"),
     )
 
 
@@ -326,8 +328,8 @@ def _print_comparisons(results: Results, table: pd.DataFrame) -> None:
     gains = product["variance_reduction"].map(lambda v: f"{1 / (1 - v):.1f} x" if v < 1 else "")
     cells["pairing saves"] = gains
     print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
-    console.print_text(f" {summary.correction_in_words(results)}")
-    if why := summary.allowance_for_difference(table, "policy"):
+    console.print_text(f" {comparisons.correction_in_words(results)}")
+    if why := comparisons.allowance_for_difference(table, "policy"):
         console.print_text(f" {why}")
 
 

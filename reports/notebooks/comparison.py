@@ -24,6 +24,7 @@ from IPython.display import display
 from dess.analysis import load_results, tables
 from dess.analysis.answers import missions as logged
 from dess.analysis.answers import summary
+from dess.analysis.answers.policies import comparisons
 from dess.analysis.answers.policies.decision_times import (
     decision_time_sentences,
     read_decision_times,
@@ -112,8 +113,8 @@ make_gallery(
 # %%
 found = {
     pairing_sentence(comparison): comparison,
-    "every learner and the best heuristic": summary.compare_learned_with_heuristic(study),
-    "every policy and the best one": summary.compare_with_best(study),
+    "every learner and the best heuristic": comparisons.compare_learned_with_heuristic(study),
+    "every policy and the best one": comparisons.compare_with_best(study),
 }
 for caption, rows in found.items():
     if len(rows):
@@ -122,8 +123,8 @@ for caption, rows in found.items():
         display(make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
 write_markdown(
     "{correction} {why} {weights}",
-    correction=summary.correction_in_words(study),
-    why=summary.allowance_for_difference(comparison, "policy"),
+    correction=comparisons.correction_in_words(study),
+    why=comparisons.allowance_for_difference(comparison, "policy"),
     weights=summary.weights_in_words(study),
 )
 

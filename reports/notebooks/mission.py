@@ -24,7 +24,8 @@ replication = 0  # the replication to show; the study must have stored its event
 from IPython.display import display
 
 from dess.analysis import load_results, numbers
-from dess.analysis.answers import missions, summary
+from dess.analysis.answers import missions
+from dess.analysis.answers.policies import ranks
 from dess.analysis.metrics import RATIO
 from dess.analysis.paper import values
 from dess.analysis.results.resimulate import LoggedMission
@@ -40,8 +41,8 @@ from dess.reports.player import READING, Shown, join_players, make_player, playe
 CHOICES = 5  # missions that the first player offers at most; each is 35 kB of the page
 
 fig1, fig4 = (load_results(f"{results}/{name}") for name in ("fig1", "fig4"))
-ranked = summary.rank_policies(fig4.missions)
-best = summary.best_policy(fig1.missions)
+ranked = ranks.rank_policies(fig4.missions)
+best = ranks.best_policy(fig1.missions)
 shown_policy = policy or ranked[0]
 seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))

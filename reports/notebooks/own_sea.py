@@ -30,16 +30,16 @@ yes = False  # True if the sweep may take more than an hour
 # %%
 from dess import load_scenario
 from dess.analysis import sweep
-from dess.analysis.answers import summary
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cheapest
 from dess.analysis.answers.missions import map_caption
 from dess.analysis.answers.settings.points import fleets_in_words, has_conditions
+from dess.analysis.answers.worst_missions import worst_missions, worst_missions_table
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
-from dess.analysis.ask.limits import find_limits
+from dess.analysis.ask.limit_search import find_limits
 from dess.analysis.figures.missions import mission_figure, sea_figure
 from dess.analysis.names import node_placing_sentence
 from dess.analysis.results.resimulate import resimulate
@@ -135,11 +135,7 @@ if has_conditions(found):
 show_parts(cost_parts_table(found))
 
 # %%
-show_parts(
-    summary.worst_missions_table(
-        found, summary.worst_missions(found, search.best.policy, point=point)
-    )
-)
+show_parts(worst_missions_table(found, worst_missions(found, search.best.policy, point=point)))
 
 # %% [markdown]
 # ## With your own sea

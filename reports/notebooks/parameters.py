@@ -23,6 +23,8 @@ from pathlib import Path
 
 from dess.analysis import load_results, metrics, names, numbers
 from dess.analysis.answers import summary
+from dess.analysis.answers.policies import ranks
+from dess.analysis.answers.policies.performance import plot_performance
 from dess.analysis.answers.settings import shapes
 from dess.analysis.answers.settings.effects import means_by_field
 from dess.analysis.answers.settings.figures import plot_effect, plot_one_by_one
@@ -32,7 +34,6 @@ from dess.analysis.answers.settings.sobol import (
     ranges_in_words,
     sobol_indices_of,
 )
-from dess.analysis.answers.summary import plot_performance
 from dess.analysis.paper import scorecard, values
 from dess.analysis.stats.kinds import LEVEL
 from dess.reports.pages.markdown import write_markdown
@@ -43,7 +44,7 @@ from dess.reports.pages.tables import make_table
 # %%
 folder = Path(results)
 fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
-policies = summary.leading_policies(fig5, learned, heuristic)
+policies = ranks.leading_policies(fig5, learned, heuristic)
 leading = policies[0]
 effects = means_by_field(fig5)
 effects = effects[effects["policy"].isin(policies)]

@@ -25,7 +25,8 @@ from IPython.display import display
 from dess.analysis import load_results, numbers, summary, tables
 from dess.analysis.answers import optimality
 from dess.analysis.answers import summary as questions
-from dess.analysis.answers.summary import plot_by_fleet, plot_performance
+from dess.analysis.answers.policies import performance, ranks
+from dess.analysis.answers.policies.performance import plot_by_fleet, plot_performance
 from dess.analysis.figures import comparison
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
 from dess.analysis.paper import values
@@ -36,7 +37,7 @@ from dess.reports.pages.tables import make_table
 
 # %%
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
-policies = questions.rank_policies(table4.missions)
+policies = ranks.rank_policies(table4.missions)
 overall = summary(table4.missions, by=["policy"]).set_index("policy").loc[policies].reset_index()
 fleets = questions.means_by_fleet(table4.missions)
 fig4_fleets = questions.means_by_fleet(fig4.missions)
@@ -48,8 +49,8 @@ dashed = "Dashed: the paper's number, with the interval that its missions and ou
 
 # %%
 make_answer(
-    questions.paper_sentence(overall, policies[0], values.TABLE_IV),
-    questions.metrics_of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
+    performance.paper_sentence(overall, policies[0], values.TABLE_IV),
+    performance.metrics_of_policy(overall, policies[0])[PRODUCT].partition(" [")[0],
 )
 
 # %%
@@ -64,7 +65,7 @@ lead_figure(
 # ## Why
 
 # %%
-write_markdown("{text}", text=escape_sentences(questions.guard_sentences(overall)))
+write_markdown("{text}", text=escape_sentences(performance.guard_sentences(overall)))
 
 # %%
 make_gallery(
@@ -147,17 +148,17 @@ if bounded and len(gaps := optimality.fleets_with_useful_bound(optimality.by_fle
 # %%
 marks = "▲ ours is above the paper's number by the interval of the difference, ▼ below, ≈ neither"
 make_table(
-    questions.compare_with_paper(overall, {None: paper}),
+    performance.compare_with_paper(overall, {None: paper}),
     f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
     overall,
 )
 
 # %%
-write_markdown("{text}", text=escape_sentences(questions.way_home_in_words(overall)))
+write_markdown("{text}", text=escape_sentences(performance.way_home_in_words(overall)))
 
 # %%
 make_table(
-    questions.compare_with_paper(fig4_fleets, fig4_paper),
+    performance.compare_with_paper(fig4_fleets, fig4_paper),
     f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
     fig4_fleets,
 )

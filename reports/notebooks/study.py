@@ -25,12 +25,14 @@ from pathlib import Path
 import numpy as np
 
 from dess.analysis import distribution, load_results, tables
-from dess.analysis.answers import summary
+from dess.analysis.answers import decided, distributions, summary
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.costs import cost_front_table, cost_parts_table
 from dess.analysis.answers.fleet.figures import draw_cost_fronts
 from dess.analysis.answers.main_figure import draw_main_figure
+from dess.analysis.answers.policies import comparisons, ranks
+from dess.analysis.answers.policies.performance import draw_performance
 from dess.analysis.answers.settings.baseline import baseline_in_words, baseline_table
 from dess.analysis.answers.settings.effects import effect_table
 from dess.analysis.answers.settings.figures import (
@@ -58,7 +60,7 @@ from dess.analysis.answers.settings.sobol import (
     variance_sentence,
 )
 from dess.analysis.answers.settings.years import year_table
-from dess.analysis.answers.summary import draw_performance
+from dess.analysis.answers.worst_missions import worst_missions, worst_missions_table
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.assumptions import assumption_facts
 from dess.analysis.metrics import METRICS, SUCCESS, metric_of
@@ -213,7 +215,7 @@ show_parts(
 
 # %% tags=["if-selection"]
 show_parts(
-    summary.selection_table(study),
+    decided.selection_table(study),
     write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
     tables.means_table(
         summary.means_of_check(study), tables.CHECKED, with_way_home(study, metrics)
@@ -226,7 +228,7 @@ show_parts(
 # Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
-show_parts(summary.precision_table(summary.reached_precisions(study)))
+show_parts(decided.precision_table(decided.reached_precisions(study)))
 
 # %% [markdown] tags=["if-fields"]
 # ## Effects of the fields
@@ -277,14 +279,14 @@ show_parts(baseline_table(study, baseline, by))
 # The differences are means over all design points, computed replication by replication.
 
 # %% tags=["if-policies"]
-compared = summary.comparison_table(study)
+compared = comparisons.comparison_table(study)
 show_parts(
     compared,
-    write_markdown("{why}", why=summary.allowance_for_difference(compared.data, "policy")),
+    write_markdown("{why}", why=comparisons.allowance_for_difference(compared.data, "policy")),
 )
 
 # %% tags=["if-learned"]
-show_parts(summary.learner_table(study))
+show_parts(comparisons.learner_table(study))
 
 # %% [markdown] tags=["if-missions"]
 # ## Single missions
@@ -292,27 +294,27 @@ show_parts(summary.learner_table(study))
 # %% tags=["if-answer", "if-missions"]
 missions = missions_at_best(study, ranked)
 whose = f"every policy at its best setting by {called}"
-worst = summary.worst_missions(study, best["policy"], point=best["point"])
+worst = worst_missions(study, best["policy"], point=best["point"])
 
 # %% tags=["if-cheapest", "if-missions"]
 missions = search.shown_missions
 whose = "the fleet of the answer"
-worst = summary.worst_missions(study, search.best.policy, point=search.shown_point)
+worst = worst_missions(study, search.best.policy, point=search.shown_point)
 
 # %% tags=["if-ranked", "if-missions"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 show_parts(
     write_markdown("These figures show {whose}:", whose=whose),
     [plot_distribution(missions, by)],
-    summary.quantile_table(spread, by),
+    distributions.quantile_table(spread, by),
 )
 
 # %% tags=["if-sensitivity", "if-missions"]
-worst = summary.worst_missions(study, summary.best_policy(study.missions))
+worst = worst_missions(study, ranks.best_policy(study.missions))
 
 # %% tags=["if-missions"]
 show_parts(
-    summary.worst_missions_table(study, worst),
+    worst_missions_table(study, worst),
     write_markdown("{commands}", commands=page.list_commands(study, worst)),
 )
 

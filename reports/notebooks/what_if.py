@@ -32,6 +32,7 @@ from IPython.display import display
 
 from dess.analysis import metrics, tables, what_if
 from dess.analysis.answers import summary
+from dess.analysis.answers.policies import comparisons
 from dess.analysis.answers.variation import measured_columns
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import study as page
@@ -107,7 +108,7 @@ make_gallery([drawing for example in examples for drawing in example.drawings()]
 # %%
 write_markdown(
     "{why} {weights}\n\n{notes}",
-    why=summary.allowance_for_difference(variation.table(), "policy"),
+    why=comparisons.allowance_for_difference(variation.table(), "policy"),
     weights=summary.weights_in_words(found),
     notes=page.list_notes(found),
 )

@@ -10,10 +10,11 @@ import pandas as pd
 from IPython.display import HTML, Markdown
 
 from dess.analysis import numbers
-from dess.analysis.answers import summary
+from dess.analysis.answers import decided
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.fleet.requirements import requirements_of
 from dess.analysis.answers.missions import map_caption, neglected_sentence, typical_replication
+from dess.analysis.answers.policies import comparisons
 from dess.analysis.answers.settings.baseline import check_baseline
 from dess.analysis.answers.settings.points import (
     fleets_in_words,
@@ -42,7 +43,8 @@ from dess.reports.pages.markdown import (
     format_code,
 )
 from dess.reports.pages.notebook import Report, cell_tags
-from dess.reports.pages.panel import Search, make_panel
+from dess.reports.pages.panel import make_panel
+from dess.reports.pages.panel_metrics import Search
 from dess.scenario.scenario import SEA
 
 _MOST_FIELDS = 3  # the largest number of fields that a title names
@@ -146,7 +148,7 @@ def shown_metrics(results: Results, by: str) -> list[str]:
 
 def list_guarantees(results: Results) -> Marked:
     """What is guaranteed about the selections, as a list."""
-    rows = summary.selected_settings(results).itertuples()
+    rows = decided.selected_settings(results).itertuples()
     lines = [
         fill_markdown("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows
     ]
@@ -158,7 +160,7 @@ def list_commands(results: Results, missions: pd.DataFrame) -> Marked:
 
     Args:
         results: The study.
-        missions: Rows of ``summary.worst_missions``.
+        missions: Rows of ``worst_missions``.
     """
     return fill_markdown(
         "These commands simulate them again. {folder} stands for the results folder of the study, "
@@ -365,8 +367,8 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-sensitivity": not is_ranked,
         # Several policies with the same missions, not years, which are compared by the paper's
         # metrics; some of them learned, some not.
-        "if-policies": has_missions and summary.has_policies_to_compare(results),
-        "if-learned": has_missions and summary.has_learned_to_compare(results),
+        "if-policies": has_missions and comparisons.has_policies_to_compare(results),
+        "if-learned": has_missions and comparisons.has_learned_to_compare(results),
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,

@@ -263,7 +263,9 @@ def _check_panel(text: str, page: Page, sampling: _Sampling) -> Check:
     # It takes the libraries that render pages, which missions do without.
     if absent := missing("reports", "a check of the panel"):
         return Check("panel", 0, notes=[f"not checked: {absent}"])
-    from dess.reports.pages.panel import CHECKED, Panel, check_panel, is_of_another_version
+    from dess.reports.pages.panel import Panel
+    from dess.reports.pages.panel_check import check_panel, is_of_another_version
+    from dess.reports.pages.panel_missions import CHECKED
 
     panel = Panel.parse(text, page.where, page.allowed)
     sampling.refuse_long_checks("panel", [*panel.spaces])

@@ -18,10 +18,10 @@ from dess.analysis.answers.fleet.requirements import metric_asked_for
 from dess.analysis.answers.fleet.risk import risk_facts
 from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, charging_slots, rule_of_thumb
 from dess.analysis.answers.settings.ranking import unequal_lengths
-from dess.analysis.ask import around, limits
+from dess.analysis.ask import around, bisection, failure_rates, limit_search, limits, tried_fleet
 from dess.analysis.ask.answer import FleetAnswer, VariationAnswer
 from dess.analysis.ask.assumptions import assumption_facts
-from dess.analysis.ask.limits import Bisection
+from dess.analysis.ask.bisection import Bisection
 from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
 from dess.analysis.names import declared_fields, field_named
@@ -313,7 +313,7 @@ def limited(searched):
     """The limits of the fleet by eight missions."""
     assert limits.limit_facts(searched) == []
     folder = searched.store.folder.parents[1]
-    limits.find_limits(searched, str(folder / "small.toml"), missions=8)
+    limit_search.find_limits(searched, str(folder / "small.toml"), missions=8)
     return {limit.field.split(".")[1]: limit for limit in limits.limits_of(searched).limits}
 
 
@@ -369,8 +369,8 @@ def test_means_at_a_rate_of_failures_follow_from_other_rates(repair):
         records = simulate_batch(space, policy, 5, number)
         hours = records.uavs["slots_flying"].sum(axis=1) * SLOT / 3600
         metrics = pd.DataFrame(records.missions)
-        flights[rate] = limits.Flights(rate, hours, records.operations["failures"], metrics)
-    model = limits.FailureModel(flights[1e-8], flights[1.0])
+        flights[rate] = tried_fleet.Flights(rate, hours, records.operations["failures"], metrics)
+    model = failure_rates.FailureModel(flights[1e-8], flights[1.0])
     for column in ("success", "collection_ratio"):
         values = flights[0.25].metrics[column]
         error = math.hypot(error_of_model(model, column, 0.25), values.sem())
@@ -390,11 +390,11 @@ def test_the_wind_comes_from_eight_directions_and_the_worst_is_named(error, last
             speed, _, place = change["data_sheet.wind"].partition(" m/s from ")
             tried.append(place)
             margin = {"SE": 7.3, "N": 7.9}.get(place, 20) - float(speed)
-            trials.append(limits.Trial({"age": margin}, {"age": error * 7.3}))
+            trials.append(tried_fleet.Trial({"age": margin}, {"age": error * 7.3}))
         return trials
 
     fleet = SimpleNamespace(space=load_scenario("jade-bight"), try_changes=try_changes)
-    found = limits._find_strongest_wind(fleet)
+    found = bisection.find_strongest_wind(fleet)
     assert (found.last, found.broken, found.is_rough) == (last, "age", error > 0)
     assert found.present == "8 m/s from SW" and found.harder == pytest.approx(7.3 / 8, rel=0.05)
     assert {*tried[:8]} == {*limits.PLACES} and {*tried[8:]} == {"N", "SE"}
@@ -434,7 +434,7 @@ def test_a_limit_is_told_with_what_is_assumed_and_what_ends_it(limit, said, monk
 
 def test_the_limit_that_breaks_something_nearest_is_told_first():
     for found in [(WIND, FAILURES, DATA), (ROUGH, FAILURES, DATA)]:
-        assert [*found] == sorted([*found][::-1], key=limits._order_of)
+        assert [*found] == sorted([*found][::-1], key=limit_search._order_of)
 
 
 class _Onward:
@@ -460,7 +460,7 @@ class _Onward:
 def test_a_limit_names_the_small_zone_at_which_uavs_are_lost(action, cells, told, monkeypatch):
     zones = [{"cells": [60, 0, cells, 1], "pads": 1}]
     sea = {"grid": 64, "rows": 8, "zone": [0, 0, 2, 1], "nodes": [[30, 0]], "zones": zones}
-    fleet = object.__new__(limits._Fleet)
+    fleet = object.__new__(tried_fleet.TriedFleet)
     known = {"missions": 3, "_team": _Onward(action), "_seed": 1, "_workers": 1, "_progress": None}
     for name, value in known.items():
         monkeypatch.setattr(fleet, name, value, raising=False)
@@ -503,6 +503,6 @@ def test_what_is_assumed_has_the_numbers_of_the_sheet(searched):
 
 
 def test_a_limit_is_told_in_the_unit_of_the_sheet():
-    speed, unit = limits._in_unit_of("10 kt from SW", 8.0, "m/s from deg")
+    speed, unit = bisection.in_unit_of("10 kt from SW", 8.0, "m/s from deg")
     assert unit == "kt" and speed == pytest.approx(8 * 3600 / 1852)
-    assert limits._in_unit_of("30 d", 86_400.0, "s") == (1, "d")
+    assert bisection.in_unit_of("30 d", 86_400.0, "s") == (1, "d")

@@ -5,7 +5,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from dess.analysis import load_study, run_study
-from dess.analysis.answers.missions import FOLDER
 from dess.policies import registry
 from dess.reports.pages import kernels
 from dess.reports.pages.notebook import NAMES
@@ -25,7 +24,6 @@ SECTIONS, STUDIED, EXTENDED = "sections.toml", "studied.toml", "extended"
 # and the results that reports and sweeps keep of questions.
 REPORTS, TRAINED, ASKED, SWEPT = "reports", "trained", "asked", "swept"
 SWEEP = (f"--scenario=../in/{SCENARIO}", "--set=uavs=1..2", "--missions=2", "--name=kept")
-KEPT = FOLDER  # the folder of what pages need beside results
 ASKED_WITH = {
     "missions": "2",
     "policies": '["greedy"]',

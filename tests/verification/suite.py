@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from dess.analysis.answers.summary import best_policy
+from dess.analysis.answers.policies.ranks import best_policy
 from dess.analysis.metrics import METRICS, SUCCESS
 from dess.analysis.results.tables import Results
 from tests.verification import balances, draws, measurements

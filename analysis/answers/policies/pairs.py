@@ -10,11 +10,8 @@ from matplotlib.figure import Figure
 
 from dess import InputError
 from dess.analysis import numbers
-from dess.analysis.answers.summary import (
-    correct_for_all_tests,
-    rank_learned_and_others,
-    rank_policies,
-)
+from dess.analysis.answers.policies.comparisons import correct_for_all_tests
+from dess.analysis.answers.policies.ranks import rank_learned_and_others, rank_policies
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.comparison import central_range
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
@@ -195,7 +192,7 @@ def compare_pair(results: Results, pair: Pair) -> pd.DataFrame:
 
     Returns:
         A row per metric, as ``dess.analysis.compare`` returns it,
-        ``summary.correct_for_all_tests``.
+        ``comparisons.correct_for_all_tests``.
     """
     missions = results.missions[results.missions["policy"].isin(pair[:2])]
     return correct_for_all_tests(

@@ -1,4 +1,30 @@
-"""The safe moves: those after which a UAV still reaches the charging zone in time."""
+"""The safe moves: those after which a UAV still reaches the charging zone in time.
+
+A UAV is in time if some legal action leaves it the battery for the way to its parking cell, for its
+margin and its wait for a pad; else it is late. Moves off the grid, into a no-fly cell and into the
+cell of a parked teammate are not legal. ``Moves`` has the legal actions in sets: the *nearest* lead
+best to the parking cell (all of them if the UAV need not charge), no teammate with the right of way
+contests the *clear*, none at all the *empty*, and those *in time* lead there if the margin is
+spent. The first case that applies tells the safe actions:
+
+| the UAV | safe |
+| --- | --- |
+| 1. must charge, and has asked for a pad or stands on the ground | hovering |
+| 2. has just overruled a teammate that must charge, and is not parked | ``_leaving_moves`` |
+| 2a. has a nearest move that is empty, or else clear | it |
+| 2b. has none, in every second slot | the nearest moves that hinder none that comes to charge |
+| 2c. was overruled itself in a small zone | one move after another |
+| 3. is in time, was overruled, and has nearest that are empty | these |
+| 4. is late, and has nearest that are clear | these; nearer to a zone in wind or to small zones |
+| 5. was overruled, and has nearest that are clear | these |
+| 6. is late, and has others that are clear and in time | these: they let the teammate pass |
+| 7. was overruled, and is late or may hover | hovering, as two that insist block each other |
+| 8. is in time where teammates are near | the nearest, without those that hinder who must charge |
+| 9. any other | the nearest |
+
+What leaves no action is left out, and a UAV without any hovers. In missions that end on the ground,
+who must charge and is in time does not take cells that teammates count on (3 to 9).
+"""
 
 from typing import NamedTuple
 
@@ -17,7 +43,7 @@ from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, 
 from dess.model.guard.queues import waits_in_zone
 from dess.model.guard.ways import (
     battery_around,
-    battery_home,
+    battery_of_way,
     cells_home,
     is_late,
     is_parked,
@@ -139,16 +165,27 @@ def _is_in_the_way(mission, uavs, i):
     return False
 
 
+class Moves(NamedTuple):
+    """The legal actions of a UAV in sets, a bit for each action.
+
+    Attributes:
+        nearest: Those after which the least battery lacks on the way to the parking cell.
+        in_time: Those after which it is reached if the margin and the slots for a pad are spent.
+        clear: Those that no teammate with the right of way contests.
+        empty: Those that no teammate contests.
+        lacking: The battery that lacks after the nearest [% / 1000].
+    """
+
+    nearest: int
+    in_time: int
+    clear: int
+    empty: int
+    lacking: int
+
+
 @inlined
 def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
-    """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
-
-    If there is no such action, the actions that lead nearest to the parking cell are safe, except
-    moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
-    to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
-    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
-    may occupy: otherwise two UAVs could block each other until the battery of one of them is
-    depleted. A UAV leaves its cell if a teammate that must charge has just been overruled by it.
+    """Find the safe actions, by the table of cases in the text of this module.
 
     Args:
         mission: ``MISSION`` record.
@@ -163,50 +200,66 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     Returns:
         The safe actions, a bit for each.
     """
-    u, planned = uavs[i], memory.planned
+    u = uavs[i]
     parked = is_parked(mission, u, chart.sizes) and not (lands(mission) and home.gives_way == 1)
-    if charge and (u.pad_request >= 0 or (lands(mission) and parked)):
-        return 1 << HOVER  # it would lose its place in the queue, or on the ground
-    reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0
-    # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
-    # that lead nearest to the parking cell, those after which it is reached if the margin and the
-    # slots for a pad are spent, and those that lead to a cell that no teammate contests.
-    clear = nearest = in_time = empty = 0
+    if charge and _keeps_its_place(mission, u, parked):
+        return 1 << HOVER
+    levels = contests(mission, uavs, i, chart.sizes)
+    # Teammates fly around a parked UAV, so it need not leave its cell for any.
+    contested = levels & ~(3 << 2 * HOVER) if parked else levels
+    moves = _sort_moves(mission, uavs, i, chart, charge, home, memory.planned, contested, reach)
+    if not parked:
+        leaving = _leaving_moves(mission, uavs, i, chart, moves)
+        if leaving:
+            return leaving
+    if charge and moves.lacking == 0 and lands(mission):
+        nearest = moves.nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory)
+        nearest = nearest or moves.nearest
+        moves = Moves(nearest, moves.in_time, moves.clear, moves.empty, moves.lacking)
+    return _choose_moves(mission, uavs, i, chart, moves, levels)
+
+
+@inlined
+def _keeps_its_place(mission, u, parked):
+    """Whether a UAV that must charge would lose its place in a queue, or on the ground."""
+    return u.pad_request >= 0 or (lands(mission) and parked)
+
+
+@inlined
+def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach):
+    """The ``Moves`` of UAV ``i``; ``contested`` are the levels of its actions."""
+    u = uavs[i]
+    nearest = in_time = clear = empty = 0
     least = _MOST_BATTERY  # the battery that lacks on the way to the parking cell
     fewest = _MOST_BATTERY  # the battery that a move and the way from there need
-    levels = contests(mission, uavs, i, chart.sizes)
+    reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0
     searches = charge and not is_calm(reach)
     if searches:
         searches = is_late(mission, uavs, i, chart, planned, home, reserve, reach)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        # Teammates fly around a parked UAV, so it need not leave its cell for any.
-        remains = action == HOVER and parked
-        contested = 0 if remains else contest(levels, action)
-        gives_way = charge and home.gives_way == 1 and action == HOVER
-        if not is_open(chart.zones, x, y) or contested == 3 or gives_way:
+        level = contest(contested, action)
+        if not _is_legal(chart, x, y, level) or (charge and _asks_too_early(home, action)):
             continue
         late = 0
         if charge:
+            cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
             if searches:
                 needed = battery_around(mission, uavs, i, chart, planned, x, y, home, reach)
             else:
-                needed = battery_home(mission, uavs, i, chart, planned, x, y, home, reach)
+                needed = battery_of_way(mission, u, chart, x, y, home.x, home.y, cells, reach)
             needed += PERCENT if is_calm(reach) else _cost(mission, u, chart, action, x, y)
-            kept = reserve
-            if not is_calm(reach) and home.cells > 0:
-                # The cheapest way may lead through a parked teammate; a move must do as well.
-                if action == HOVER and not _is_shut_out(mission, uavs, u, chart, home):
-                    needed = max(needed, fewest + _least_difference(mission))
-                fewest = min(fewest, needed)
-                kept = max(kept, _wait(mission, u, chart, action, x, y, home))
+            if action == HOVER and not is_calm(reach) and _must_move(mission, uavs, u, chart, home):
+                needed = max(needed, fewest + _least_difference(mission))
+            fewest = min(fewest, needed)
+            kept = max(reserve, _wait(mission, u, chart, action, x, y, home, reach))
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + waiting_slot(mission) + kept - usable_battery(mission, u), 0)
-            late = max(late, _late_home(mission, uavs, i, chart, planned, action, x, y, home))
+            late = max(late, _late_home(mission, u, action, cells))
         bit = 1 << action
-        if contested == 0:
+        if level == 0:
             empty |= bit
-        if contested < 2:
+        if level < 2:
             clear |= bit
         if late <= reserve:
             in_time |= bit
@@ -214,36 +267,59 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
             least, nearest = late, 0
         if late == least:
             nearest |= bit
-    elsewhere = nearest & ~(1 << HOVER)
-    if elsewhere and not parked and _is_in_the_way(mission, uavs, i):
-        # a teammate may stay where it is, unless it is told to leave its cell, too
-        leaves = elsewhere & empty or elsewhere & clear
-        if not leaves and mission.slot % 2 == 1:  # in the other slots, it lets them go first
-            leaves = elsewhere & ~_ceded(mission, uavs, i, chart.sizes)
-        if u.overruled and u.zone >= 0 and is_tight(mission, chart.sizes):
-            # A teammate may want the same cell again and again, so it tries one after another, and
-            # lets the teammate go first in some slots.
-            leaves = leaves or clear & in_time & ~(1 << HOVER) or elsewhere | 1 << HOVER
-            leaves = _one_of(leaves, mission.slot)
-        if leaves:
-            return leaves
-    if charge and least == 0 and lands(mission):
-        nearest = nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory) or nearest
-    if nearest & empty and least == 0 and u.overruled:
-        return nearest & empty
-    if nearest & clear and (least > 0 or u.overruled):
-        if least > 0 and (has_costs(mission) or is_tight(mission, chart.sizes)):
-            return _nearer_to_zone(chart, u, nearest & clear)
-        return nearest & clear
-    if least > 0 and clear & in_time:
-        # these slots are there to wait or step aside until the teammate has passed
-        return clear & in_time
-    # Two UAVs that both insist block each other: the one without the right of way waits a slot.
-    if u.overruled and not nearest & clear and (least > 0 or nearest >> HOVER & 1):
+    return Moves(nearest, in_time, clear, empty, least)
+
+
+@inlined
+def _is_legal(chart, x, y, level):
+    """Whether a cell is open, and no teammate is parked on it."""
+    return level != 3 and is_open(chart.zones, x, y)
+
+
+@inlined
+def _asks_too_early(home, action):
+    """Whether a UAV would ask for a pad, and a teammate would run empty."""
+    return home.gives_way == 1 and action == HOVER
+
+
+@inlined
+def _leaving_moves(mission, uavs, i, chart, moves):
+    """The actions by which UAV ``i`` leaves its cell if it stands in the way; 0 if it may stay."""
+    elsewhere = moves.nearest & ~(1 << HOVER)
+    if not elsewhere or not _is_in_the_way(mission, uavs, i):
+        return 0
+    u = uavs[i]
+    leaving = elsewhere & moves.empty or elsewhere & moves.clear
+    if not leaving and mission.slot % 2 == 1:  # in the other slots, it lets them go first
+        leaving = elsewhere & ~_ceded(mission, uavs, i, chart.sizes)
+    if u.overruled and u.zone >= 0 and is_tight(mission, chart.sizes):
+        # A teammate may want the same cell again and again, so it tries one after another, and
+        # lets the teammate go first in some slots.
+        aside = moves.clear & moves.in_time & ~(1 << HOVER)
+        leaving = _one_of(leaving or aside or elsewhere | 1 << HOVER, mission.slot)
+    return leaving
+
+
+@inlined
+def _choose_moves(mission, uavs, i, chart, moves, levels):
+    """The safe actions of UAV ``i`` that neither keeps its place nor leaves it for a teammate."""
+    u = uavs[i]
+    is_late = moves.lacking > 0
+    uncontested = moves.nearest & moves.clear
+    if u.overruled and not is_late and moves.nearest & moves.empty:
+        return moves.nearest & moves.empty
+    if uncontested and is_late and (has_costs(mission) or is_tight(mission, chart.sizes)):
+        return _nearer_to_zone(chart, u, uncontested)
+    if uncontested and (is_late or u.overruled):
+        return uncontested
+    if is_late and moves.clear & moves.in_time:
+        return moves.clear & moves.in_time
+    if u.overruled and (is_late or moves.nearest >> HOVER & 1):
         return 1 << HOVER
-    if least == 0 and levels > 0:
-        nearest = nearest & ~_ceded(mission, uavs, i, chart.sizes) or nearest
-    return nearest or 1 << HOVER  # who gives way may have nowhere to go
+    if not is_late and levels > 0:
+        yielding = moves.nearest & ~_ceded(mission, uavs, i, chart.sizes)
+        return yielding or moves.nearest or 1 << HOVER
+    return moves.nearest or 1 << HOVER  # who gives way may have nowhere to go
 
 
 @inlined
@@ -255,12 +331,13 @@ def _one_of(actions, number):
 
 
 @inlined
-def _late_home(mission, uavs, i, chart, planned, action, x, y, home):
-    """What lacks if an action brings a UAV home too late, as the battery of the slots that lack."""
+def _late_home(mission, u, action, cells):
+    """What lacks if an action brings a UAV home too late, as the battery of the slots that lack.
+
+    ``cells`` are those of the way from the cell to which the action leads.
+    """
     if not has_costs(mission):
         return 0
-    u = uavs[i]
-    cells = cells_home(mission, uavs, i, chart, planned, x, y, home)
     slots = cells * u.slots_per_cell + (1 if action == HOVER else u.slots_per_cell)
     return waiting_slot(mission) * late_slots(mission, slots + 1 + margin_slots(mission, u))
 
@@ -288,19 +365,27 @@ def _cells_to_zone(chart, x, y):
 
 
 @inlined
-def _is_shut_out(mission, uavs, u, chart, home):
-    """Whether UAV ``u`` can only wait until a teammate has charged that is parked on its way."""
+def _must_move(mission, uavs, u, chart, home):
+    """Whether hovering counts as worse than the best move of UAV ``u`` to its parking cell.
+
+    The cheapest way may lead through a parked teammate; then a move must do as well. Only a UAV
+    that is shut out can but wait until a teammate has charged that is parked on its way.
+    """
+    if home.cells == 0:
+        return False
     detour = home.cells - distance(chart, u.x, u.y, home.x, home.y)
-    return detour >= longest_charge(mission, uavs)
+    return detour < longest_charge(mission, uavs)
 
 
 @inlined
-def _wait(mission, u, chart, action, x, y, home):
+def _wait(mission, u, chart, action, x, y, home, reach):
     """The battery that a UAV keeps in wind for its wait for a pad if it comes after an action.
 
     In still air, it may as well fly about until its turn comes. In wind, this costs more than the
     slots that it takes, and so does a detour of two cells around a parked teammate.
     """
+    if is_calm(reach) or home.cells == 0:
+        return 0
     slots = 1 if action == HOVER else u.slots_per_cell
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
     if home.begins <= arrives:

@@ -43,8 +43,9 @@ _ORIGINS = {
     "edge_snr": ("snr", *LINK_BUDGET, "free_space", "bandwidth"),
 }
 
-# The fields that a scenario with a sheet may set otherwise.
-OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota")
+# The fields that a scenario with a sheet may set otherwise; what slots take is another table in a
+# window of weather.
+OPEN = ("flying_time", "charge_start", "charge_complete", "landing", "quota", "consumption.slots")
 
 
 class DataSheet(Types, Radio):
@@ -75,7 +76,7 @@ class DataSheet(Types, Radio):
     @property
     def assumed(self) -> dict[str, str]:
         """What the sheet does not say, and is assumed."""
-        unused = set()
+        unused = {"delivery"}  # of years with weather alone
         if self.modulation == LORA or self.rates:
             unused.add("max_rate")
         if self.rates:

@@ -23,6 +23,7 @@ learner = "ddqn"  # the policy that has learned
 from dess.analysis import load_results, numbers, tables
 from dess.analysis.answers import optimality, summary
 from dess.analysis.answers import planner as answers
+from dess.analysis.answers.policies import comparisons
 from dess.analysis.answers.policies.decision_times import (
     decision_time_sentences,
     read_decision_times,
@@ -92,7 +93,7 @@ write_markdown(
     "{gap} {weights} {why}",
     gap=escape_sentences(optimality.in_words(bounded, planners[-1])),
     weights=summary.weights_in_words(study),
-    why=summary.allowance_for_difference(
+    why=comparisons.allowance_for_difference(
         differences[differences["uavs"] == optimality.ALL], "policy"
     ),
 )

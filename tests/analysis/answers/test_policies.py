@@ -9,8 +9,7 @@ import pytest
 
 from dess import InputError
 from dess.analysis import run_study
-from dess.analysis.answers import summary
-from dess.analysis.answers.policies import decision_times, pairs
+from dess.analysis.answers.policies import comparisons, decision_times, pairs, ranks
 from dess.analysis.answers.policies.decision_times import (
     CALLS,
     ensure_decision_times,
@@ -69,7 +68,7 @@ def test_the_pair_is_the_best_learned_policy_and_the_best_other(
     means = results.missions.groupby("policy")[PRODUCT].mean()
     ranked = means.sort_values(ascending=False).index.tolist()
     taught = {f"learner {n}": [ranked[k] for k in of] for n, of in enumerate(learners)}
-    for module in (pairs, summary):
+    for module in (pairs, comparisons, ranks):
         monkeypatch.setattr(module, "trained_policies_by_learner", lambda results: taught)
     asked = {name: ranked[k] for name, k in named.items()}
     policy, baseline, candidates = pair
@@ -80,14 +79,14 @@ def test_a_pair_has_one_p_value_in_every_table(results):
     """All tables are corrected for the same tests: of three pairs by three metrics."""
     pair = pair_of(results)
     of_pair = compare_pair(results, pair).set_index("metric")
-    table = summary.compare_with_best(results)
+    table = comparisons.compare_with_best(results)
     other = table[table["policy"] == {*pair[:2]}.difference(table["baseline"]).pop()]
     expected = other.set_index("metric")
     assert of_pair["p_adjusted"].to_dict() == expected["p_adjusted"].to_dict()
     assert of_pair["p_adjusted"].tolist() == pytest.approx(
         (9 * of_pair["p"]).clip(upper=1).tolist()
     )
-    assert "for the 9 comparisons" in summary.comparison_table(results).caption
+    assert "for the 9 comparisons" in comparisons.comparison_table(results).caption
 
 
 def test_what_is_no_pair_is_refused(results, studied):

@@ -10,6 +10,7 @@ import pytest
 from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
+from dess.analysis.answers.policies import comparisons, performance, ranks
 from dess.analysis.answers.settings.sobol import sobol_indices
 from dess.analysis.metrics import (
     METRICS,
@@ -154,13 +155,13 @@ def test_an_allowance_for_failures_is_said_with_both_intervals():
     rows = [("a", n, value, 2) for n, value in enumerate(ratio + np.tile([0.095, 0.105], 150))]
     rows += [("b", n, value, 2) for n, value in enumerate(ratio)]
     missions = pd.DataFrame(rows, columns=["policy", "replication", PRODUCT, "uavs"])
-    text = summary.allowance_for_difference(compare(missions, "b", [PRODUCT]), "policy")
+    text = comparisons.allowance_for_difference(compare(missions, "b", [PRODUCT]), "policy")
     # Student's t of ±0.5 points: 1.968 x 0.5 / sqrt(299); with 0.8 and -0.7 added: ±0.7 points.
     assert "300 missions without a failure do not rule out one in 100 missions" in text
     assert "the difference of a in product is known to ±0.7" in text
     assert "without it (Student's t), to ±0.057 points" in text
     unlike = missions.assign(**{PRODUCT: np.random.default_rng(1).random(600)})
-    assert summary.allowance_for_difference(compare(unlike, "b", [PRODUCT]), "policy") == ""
+    assert comparisons.allowance_for_difference(compare(unlike, "b", [PRODUCT]), "policy") == ""
 
 
 def test_it_is_said_how_means_weigh_the_numbers_of_uavs():
@@ -203,9 +204,9 @@ def test_policies_are_ranked_by_the_mean_over_design_points():
     ]
     missions = pd.DataFrame(rows, columns=["policy", "point", PRODUCT])
     # A: (0.9 + 0.1) / 2.
-    assert summary.rank_policies(missions) == ["b", "c", "a"]
-    assert summary.best_policy(missions) == "b"
-    assert summary.best_policy(missions, among=["a", "c"]) == "c"
+    assert ranks.rank_policies(missions) == ["b", "c", "a"]
+    assert ranks.best_policy(missions) == "b"
+    assert ranks.best_policy(missions, among=["a", "c"]) == "c"
 
 
 def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
@@ -217,11 +218,11 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path):
     assert trained_policies_by_learner(results) == {"ddqn": ["ddqn", "ddqn-2"]}
     mixed = results_of("greedy", "ddqn", "ddqn-paper", "ddqn,greedy")
     assert sorted(trained_policies_by_learner(mixed).values()) == [["ddqn"], ["ddqn-paper"]]
-    table = summary.compare_learned_with_heuristic(results)
+    table = comparisons.compare_learned_with_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}
     alone = results_of("greedy", "ddqn")
-    assert set(summary.compare_learned_with_heuristic(alone)["about"]) == {"this checkpoint"}
+    assert set(comparisons.compare_learned_with_heuristic(alone)["about"]) == {"this checkpoint"}
 
 
 COPY = """
@@ -247,9 +248,9 @@ def test_a_policy_of_a_user_with_weights_is_learned(tmp_path):
     study = load_study("table4", policies=["random", copy, "ddqn", "greedy"], missions=5)
     results = run_study(study, tmp_path / "out")
     assert trained_policies_by_learner(results) == {copy: [copy], "ddqn": ["ddqn"]}
-    learned, heuristics = summary.rank_learned_and_others(results)
+    learned, heuristics = ranks.rank_learned_and_others(results)
     assert {*learned} == {copy, "ddqn"} and heuristics[0] == "greedy"
-    table = summary.compare_learned_with_heuristic(results)
+    table = comparisons.compare_learned_with_heuristic(results)
     assert {*table["baseline"]} == {"greedy"} and {*table["learner"]} == {copy, "ddqn"}
 
 
@@ -261,6 +262,6 @@ def test_what_is_said_of_the_guard_is_computed():
         for policy, mean in shares.items()
         for metric in METRICS
     )
-    said = summary.guard_sentences(means)
+    said = performance.guard_sentences(means)
     assert "under the return guard: they succeed in 40.0 % to 90.0 % of the missions." in said
     assert "nearly all" not in said

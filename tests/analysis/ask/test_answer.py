@@ -96,7 +96,7 @@ def row(difference, low, high, p=0.01, n=100, p_student=1.0):
 
 
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
-    changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
+    changes = {"age.reward": -1.0, "failures.uav_rate": 0.2, "failures.uav_repair": 3.0}
     results = asked(tmp_path, 6, settings=changes, policies=["greedy"]).results
     answers = found.compare_sides(results).set_index("metric")
     sides = results.missions.pivot(index="replication", columns="point", values="age")
@@ -105,6 +105,8 @@ def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(t
     assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
     failed = results.missions.query("point == @VARIATION")["failures"].mean()
     assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
+    # The baseline cannot have a failure, so the variation cannot have fewer.
+    assert answers.loc[["failures", "slots_grounded"], "low"].min() >= 0
 
 
 def test_what_is_called_adjusted_is_adjusted(answer):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.answers.summary import plot_by_fleet, plot_performance
+from dess.analysis.answers.policies.performance import plot_by_fleet, plot_performance
 from dess.analysis.figures import comparison, name_best_mean, style
 from dess.analysis.metrics import AGE, BOUND, PRODUCT, SUCCESS
 

@@ -40,6 +40,9 @@ def constants_of(space: ScenarioSpace) -> dict[str, Any]:
             constants[name] = value.model_dump() if isinstance(value, Section) else value
         constants["charge_rate"] = space.charge_fraction  # exactly, as the times were typed
         constants["fleet"] = [_type_in_slots(kind, space.data_sheet) for kind in space.fleet]
+        if space.data_sheet.idle:
+            slot = 60 * _number(space.data_sheet.endurance) / 100
+            constants["before"] = {"idle": float(3600 * _number(space.data_sheet.idle) / slot)}
     return constants
 
 

@@ -92,6 +92,8 @@ PLAIN: dict[str, tuple[str, ...]] = {
     "--of": (RESULTS,),
     "--point": ("0", "1"),
     "--start": ("2026-06-01T08:00Z",),
+    "--window": ("2013-02-11T18",),
+    "--years": ("2",),
     "--air-distance": ("10 m", "30 ft"),
     "--ground-distance": ("3 m",),
     "--compare": ("0", "1"),

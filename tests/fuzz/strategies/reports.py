@@ -2,6 +2,8 @@
 
 from hypothesis import strategies as st
 
+from dess.analysis.results.chunks import DERIVED
+from dess.reports.pages.kernels import TIMED
 from dess.reports.pages.notebook import read_report
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
@@ -13,8 +15,6 @@ from tests.fuzz.strategies.values import texts, toml_values
 _RESULTS = "out/results"
 # Folders that a report reads beside those of its studies.
 _BESIDE = {
-    "comparison": (ready.KEPT,),
-    "planner": (ready.KEPT,),
     "performance": ("gap",),
     "scorecard": ("gap",),
 }
@@ -28,10 +28,9 @@ def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
     studies, beside = read_report(name).studies, _BESIDE.get(name, ())
     folders = [*studies, *beside]
     steps: list[Step] = [copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
-    changes = [
-        (json_changes if one == ready.KEPT else results_changes)(f"{_RESULTS}/{one}")
-        for one in folders
-    ]
+    changes = [results_changes(f"{_RESULTS}/{one}") for one in folders]
+    if name in TIMED:  # the times of decisions, which are kept in the folder of the study
+        changes.append(json_changes(f"{_RESULTS}/{TIMED[name]}/{DERIVED}"))
     known = read_report(name).parameters
     parameters = {key: text for key, text in ready.ASKED_WITH.items() if key in known}
     if name in _ASKING:

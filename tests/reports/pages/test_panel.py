@@ -34,18 +34,13 @@ from dess.analysis.stats.verdict import (
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
-from dess.reports.pages import index
+from dess.reports.pages import index, panel_settings
 from dess.reports.pages import panel as panels
 from dess.reports.pages.index import make_index
 from dess.reports.pages.page import PANEL, Page
-from dess.reports.pages.panel import (
-    CHECKED,
-    PORTION,
-    Search,
-    hash_missions,
-    make_another,
-    make_panel,
-)
+from dess.reports.pages.panel import PORTION, make_another, make_panel
+from dess.reports.pages.panel_metrics import Search
+from dess.reports.pages.panel_missions import CHECKED, hash_missions
 from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
@@ -100,7 +95,7 @@ def test_every_whole_number_can_be_chosen():
     """Of UAVs, up to that of the page if it is larger; of pads, as many as the zone has cells."""
     for uavs, most in ((3, 8), (11, 11)):
         space = load_scenario("paper", uavs=uavs)
-        settings = dict(panels._settings_of(space, space))
+        settings = dict(panel_settings.settings_of(space, space))
         assert settings["uavs"] == [*range(1, most + 1)]
         assert settings["pads"] == [*range(1, 17)]
 
@@ -109,17 +104,17 @@ def test_settings_of_a_data_sheet_are_told_in_its_words():
     """Which zone's pads they are, and failures as a time: 1 in 2000 slots of 21 s is 11.7 h."""
     space = load_scenario("jade-bight")
     told = {
-        key: panels._describe_setting(key, values, space, None)
+        key: panel_settings.describe_setting(key, values, space, None)
         for key, values in (("pads", [1, 2]), ("failures.uav_rate", [0.0, 0.0005]))
     }
     assert told["pads"]["name"] == "Number of charging pads in zone 1"
     failures = told["failures.uav_rate"]
     assert failures["texts"] == ["none", "one every 11.67 h"]
     assert failures["name"] == "Failures of a UAV in flight, which is then lost for good"
-    of_paper = panels._describe_setting("pads", [1, 2], load_scenario("paper"), None)
+    of_paper = panel_settings.describe_setting("pads", [1, 2], load_scenario("paper"), None)
     assert of_paper["name"] == "Number of charging pads"
     repaired = load_scenario("paper", failures={"uav_rate": 0.001, "uav_repair": 20.0})
-    failures = panels._describe_setting("failures.uav_rate", [0.0, 0.001], repaired, None)
+    failures = panel_settings.describe_setting("failures.uav_rate", [0.0, 0.001], repaired, None)
     assert failures["texts"] == ["none", "one every 1,000 mission slots"]
     assert failures["name"].endswith("grounded for 20 mission slots in the mean")
 
@@ -127,25 +122,27 @@ def test_settings_of_a_data_sheet_are_told_in_its_words():
 def test_wind_data_and_the_pads_of_every_zone_are_settings_where_there_is_a_sheet():
     """They are values of the sheet, and make a page larger by a few kB."""
     space = load_scenario("jade-bight")
-    settings = dict(panels._settings_of(space, space))
+    settings = dict(panel_settings.settings_of(space, space))
     assert settings["data_sheet.wind"][0] == "0 m/s from SW"
     assert "8 m/s from SW" in settings["data_sheet.wind"]
     assert settings["data_sheet.data_rate"][:2] == ["0.75 MB/h", "1.5 MB/h"]
     assert settings["zones.pads"] == [1, 2, 3, 4]
     image = make_image(space, ["greedy"], SEED, PORTION, settings)
     assert len(json.dumps(image.document()["sliders"])) < 10_000
-    assert not {*panels._OF_SHEET, "zones.pads"} & {*dict(panels._settings_of(PAPER, PAPER))}
+    assert not {*panel_settings.OF_SHEET, "zones.pads"} & {
+        *dict(panel_settings.settings_of(PAPER, PAPER))
+    }
     # A sheet without failures has them by their rate.
     assert "failures.uav_rate" in settings and "data_sheet.mtbf" not in settings
 
 
 def test_failures_of_a_sheet_are_a_setting_in_its_words():
     sea = load_scenario("jade-bight", **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
-    settings = dict(panels._settings_of(sea, sea))
+    settings = dict(panel_settings.settings_of(sea, sea))
     values = settings["data_sheet.mtbf"]
     assert values == ["5 h", "12.5 h", "25 h", "50 h", "100 h", "200 h", "500 h"]
     assert "failures.uav_rate" not in settings
-    told = panels._describe_setting("data_sheet.mtbf", values, sea, "50 h")
+    told = panel_settings.describe_setting("data_sheet.mtbf", values, sea, "50 h")
     assert told["texts"][0] == "one every 5 h" and told["default"] == 3
     assert told["name"].endswith("grounded for 2 h in the mean")
     made = make_image(sea, ["greedy"], SEED, PORTION, {"data_sheet.mtbf": values})
@@ -160,19 +157,29 @@ def test_failures_of_a_sheet_are_a_setting_in_its_words():
 def test_where_one_sheet_has_no_failures_the_sides_differ_by_what_follows_from_the_other():
     sea = load_scenario("jade-bight")
     failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
-    settings = dict(panels._settings_of(sea, failing))
+    panel = panels._panel_of(sea, failing, "jade-bight", ["greedy"], SEED, {})
+    baseline, variation = panel.spaces
+    settings = dict(panel_settings.settings_of(baseline, variation))
     assert not [key for key, values in settings.items() if values[0] == values[-1]]
-    sides = [panels._value_of(failing, key) for key in settings]
+    sides = [panel_settings.value_of(variation, key) for key in settings]
     values = dict(zip(settings, sides, strict=True))
-    assert ScenarioSpace.of(sea, **values).failures == failing.failures
+    assert ScenarioSpace.of(baseline, **values).failures == failing.failures
+    repair = f"failures.uav_repair={failing.failures.uav_repair}"
+    assert repair in panel.render()  # commands set it on both sides
+    own, ours, theirs = (
+        simulate_batch(side, policies.load("greedy"), SEED, 60) for side in (sea, *panel.spaces)
+    )
+    assert ours.missions.tobytes() == own.missions.tobytes() != theirs.missions.tobytes()
+    assert ours.uavs.tobytes() == own.uavs.tobytes()
+    assert not ours.operations["failures"].any()
 
 
 def test_rates_of_nodes_are_told_as_shares_of_those_of_the_sheet():
     sea = load_scenario("jade-bight")
     rates = ["2 MB/h", "4 MB/h"] + ["3 MB/h"] * (len(sea.nodes) - 2)
     space = ScenarioSpace.of(sea, **{"data_sheet.data_rate": rates})
-    values = dict(panels._settings_of(space, space))["data_sheet.data_rate"]
-    told = panels._describe_setting("data_sheet.data_rate", values, space, None)
+    values = dict(panel_settings.settings_of(space, space))["data_sheet.data_rate"]
+    told = panel_settings.describe_setting("data_sheet.data_rate", values, space, None)
     assert told["texts"][:2] == ["0.25 times the sheet's", "0.5 times the sheet's"]
     assert values[0][:2] == ["0.5 MB/h", "1 MB/h"]
 
@@ -203,12 +210,12 @@ def test_the_grid_says_whose_answer_the_page_has(policy):
 def test_the_settings_begin_with_those_of_the_scenario(name):
     """Where they stand at first, they change no byte of the arrays."""
     space = load_scenario(name)
-    settings = dict(panels._settings_of(space, space))
+    settings = dict(panel_settings.settings_of(space, space))
     assert len(settings) >= 3
     image = make_image(space, ["greedy"], SEED, PORTION, settings)
     for slider in image.sliders:
         changed = copy_inputs(image.arrays)
-        slider.apply(changed, panels._value_of(space, slider.setting))
+        slider.apply(changed, panel_settings.value_of(space, slider.setting))
         for array, content in changed.items():
             assert content.tobytes() == image.arrays[array].tobytes(), (slider.setting, array)
 

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis import numbers, run_study
-from dess.analysis.answers import summary
+from dess.analysis.answers import decided
 from dess.analysis.answers.fleet import cheapest, verdicts
 from dess.analysis.answers.fleet import tables as fleet_tables
 from dess.analysis.answers.fleet.cheapest import search_of
@@ -42,7 +42,7 @@ ASKED = (verdicts.judge_settings, verdicts.quoted_settings, verdicts.checked_set
 
 def test_a_search_is_kept_told_and_checked(searched):
     manifest = searched.store.manifest
-    selections = summary.selected_settings(searched)
+    selections = decided.selected_settings(searched)
     for number, policy in enumerate(searched.policies):
         choice = searched.cheapest(policy)
         assert manifest.selected[number] == choice.selected

@@ -7,7 +7,8 @@ from dess import InputError
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings.ranking import rank_settings
 from dess.analysis.ask.answer import sweep
-from dess.analysis.ask.limits import find_limits, limits_of
+from dess.analysis.ask.limit_search import find_limits
+from dess.analysis.ask.limits import limits_of
 from dess.analysis.ask.question import sweep_question
 from dess.analysis.metrics import LEAST, NODE_RATIOS, PRODUCT
 from tests.analysis.small import SHEET, found_of, write_scenario

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis import compare, load_study, run_study
-from dess.analysis.answers import summary
+from dess.analysis.answers import decided
 from dess.analysis.answers.settings import figures
 from dess.analysis.answers.settings.baseline import compare_with_baseline
 from dess.analysis.answers.settings.effects import (
@@ -281,7 +281,7 @@ def test_a_study_with_a_selection_has_one_best_setting_its_own(tmp_path, capsys)
     drawing = figures.draw_heat_map(results, "charge_complete", "charge_start", "reward")
     assert drawing.caption.startswith("The highest mean of what the study selects is")
     assert f"C_S {start}. " in drawing.caption
-    selected = summary.selection_table(results)
+    selected = decided.selection_table(results)
     assert selected.cells["Reward"].iloc[0].startswith(f"{means[best]:,.0f} [")
     assert selected.caption.endswith("by reward")
     assert cli.main(["study", "show", str(tmp_path / "out")]) == 0

@@ -7,9 +7,10 @@ import pandas as pd
 import pytest
 
 from dess import InputError
+from dess.analysis.answers.policies.ranks import leading_policies
 from dess.analysis.answers.settings import effects, shapes
 from dess.analysis.answers.settings.shapes import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
-from dess.analysis.answers.summary import leading_policies, means_of_points
+from dess.analysis.answers.summary import means_of_points
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import adjust_p_values, compare_pairs
 from dess.analysis.stats.weights import by_replication

@@ -8,6 +8,13 @@ from tests.dess.model.auditor.log import Log
 from tests.dess.model.auditor.packets import Ages, Packets
 from tests.dess.model.auditor.uavs import LARGEST_DEVIATE, Fleet, Uav
 
+ROUNDING = 1e-9  # of data [data units]
+
+
+def count_of(constants: Mapping[str, Any]) -> int:
+    """The number of nodes."""
+    return len(constants["nodes"])
+
 
 class Nodes:
     """The data of the nodes [data units].
@@ -26,7 +33,14 @@ class Nodes:
         self.initial = self.arrived = self.lost = 0.0
         self.begun: list[float] = []  # the initial data of each node
         self.gained, self.taken = [0.0] * len(self.cells), [0.0] * len(self.cells)
-        self.ages = Ages(len(self.cells))
+        # What a mission begins with that is not the first one: how long nodes were idle before it,
+        # their data then, and their ages.
+        before = constants.get("before", {})
+        self.idle: float = before.get("idle", 0.0)
+        self.left: list[float] | None = before.get("data")
+        m = constants["communication_slots"]
+        ages = before.get("ages", [0.0] * count_of(constants))
+        self.ages = Ages([round((age + self.idle) * m) / m for age in ages])
         self.loses = constants.get("failures", {}).get("node_data") == "lost"
         arrivals = constants.get("arrivals", {"process": "slotted"})
         count = len(self.cells)
@@ -54,7 +68,16 @@ class Nodes:
                 packet = {"packet": len(self.packets.all), "generated": 0.0}
                 self.packets.store(k, 0.0, amount)
             self.take("mission_start", 0.0, k, value=amount, **packet)
-            self.log.require(low <= amount <= high, "initial data out of range")
+            if self.left is not None:
+                low = high = self.left[k]
+            collected = amount - low
+            if self.idle:
+                is_right = collected < ROUNDING or self._is_made(
+                    collected, self.rates[k] * self.idle
+                )
+            else:
+                is_right = low <= amount <= high
+            self.log.require(is_right, "initial data out of range")
             self.residual.append(amount)
         self.initial = sum(self.residual)
         self.begun = [*self.residual]

@@ -77,8 +77,10 @@ class Packets:
 class Ages:
     """The ages of all nodes, and the teeth of their saws: the ages at their beginnings and ends."""
 
-    def __init__(self, nodes: int):
-        self.newest, self.fell = [0.0] * nodes, [0.0] * nodes
+    def __init__(self, ages: list[float]):
+        """Begin with the ages of the nodes."""
+        nodes = len(ages)
+        self.newest, self.fell = [-age for age in ages], [0.0] * nodes
         self.teeth: list[tuple[float, float]] = []
         self.areas = [0.0] * nodes
 

@@ -152,12 +152,19 @@ class Fleet:
             x, y = int(row.x), int(row.y)
             self.uavs.append(Uav(x=x, y=y, from_x=x, from_y=y, battery=row.battery, **known))
             self.take("mission_start", 0.0, i)
-            self.log.require((x, y) in self.zones[0], "a UAV starts outside the zone")
+            is_first = "uavs" not in self.c.get("before", {})
+            zones = self.zones[:1] if is_first else self.zones
+            self.log.require(any((x, y) in zone for zone in zones), "a UAV starts outside the zone")
         cells = {u.cell for u in self.uavs}
         self.log.require(len(cells) == len(self.uavs), "a cell with two UAVs")
 
     def check_batteries(self, flying_time: int) -> None:
         """Check the batteries at the start."""
+        if "uavs" in (before := self.c.get("before", {})):
+            for u, (battery, remainder) in zip(self.uavs, before["uavs"], strict=True):
+                self.log.require(u.battery == battery, "a battery is not what was left")
+                u.remainder = u.largest_remainder = remainder
+            return
         for i, u in enumerate(self.uavs):
             full = self.type_of(i)["flying_time"] or flying_time
             if u.full:

@@ -1,7 +1,7 @@
 """The page of a sea with a data sheet: for the one who pays, on one sheet of paper."""
 
 from dess.analysis import load_results
-from dess.analysis.ask import around, limits
+from dess.analysis.ask import around, limit_search
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.question import sweep_question
 from dess.reports.pages.render import render_study
@@ -64,7 +64,7 @@ def test_the_answer_the_figure_and_what_is_assumed_are_one_sheet_of_paper(tmp_pa
     )
     found = question.ask()
     around.question_around(found, question.study.scenario, 5).ask()
-    limits.find_limits(found, question.study.scenario, missions=3)
+    limit_search.find_limits(found, question.study.scenario, missions=3)
     with notebooks_here(is_drawn=True):
         path = render_study(found, tmp_path / "reports")
     text = words_of(path.read_text("utf-8"))
