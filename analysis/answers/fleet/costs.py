@@ -223,12 +223,12 @@ def cost_facts(results: Results, policy: str, fleet: Sequence[int]) -> list[Fact
             for part, name in _PART_NAMES.items()
             if part in prices.paid_parts
         ]
-        flown = "the flights of a year"
+        simulated = "the flights of a year"
         if not results.study.years:
-            flown = numbers.format_count(prices.paid_missions, "mission")
+            simulated = numbers.format_count(prices.paid_missions, "mission")
         total = money(means.sum() - means[PURCHASE])
         facts.append(Fact("of it for the purchase", money(means[PURCHASE])))
-        facts.append(Fact(f"of it for {flown}", f"{total}: {', '.join(running)}"))
+        facts.append(Fact(f"of it for {simulated}", f"{total}: {', '.join(running)}"))
     facts.append(_cost_per_gb(results, rows))
     if prices.years is not None:
         price = prices.price_of_fleet(results.scenario(fleet[0]))

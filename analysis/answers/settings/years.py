@@ -46,8 +46,8 @@ def years_of_setting(results: Results, policy: str, point: int) -> pd.DataFrame:
     Returns:
         A row per year: ``year``, ``replication``, ``open`` (the share of the operating hours in
         which UAVs could fly), ``windows``, ``longest_gap`` [h], the mean age ``age_h`` [h], the
-        share ``late`` of the data, ``lost`` UAVs, ``node_ages_h`` (of each node [h]), and the mean
-        age of each month, ``age_month_1`` to ``age_month_12`` [h].
+        share ``late`` of the data, ``lost`` UAVs, the mean age of each node [h] (the column of
+        ``NODE_AGES`` in hours), and the mean age of each month [h], ``AGES_OF_MONTHS``.
     """
     rows = results.missions
     rows = rows[(rows["policy"] == policy) & (rows["point"] == point)]
