@@ -2,8 +2,10 @@
 
 ``python benchmarks/faults.py`` copies the tree, runs the tests of each oracle in the copy, which
 must pass, and then plants one fault after the other; ``--fault NAME`` and ``--oracle NAME`` choose
-some of them. ``benchmarks/faults.csv`` has the first test of each oracle that failed, as the last
-run of all left it. ``benchmarks/mutants.py`` leaves compiled functions out.
+some of them. ``benchmarks/faults.csv`` has what was found until now: the first test of each oracle
+that failed, ``none``, or nothing where that oracle was not run; faults that it lacks were not
+planted yet. A fault takes about a minute of one core for the first three oracles.
+``benchmarks/mutants.py`` leaves compiled functions out.
 """
 
 import argparse
@@ -310,7 +312,8 @@ def main() -> None:
         for fault in (f for f in FAULTS if any(part in f.name for part in chosen)):
             with fault.planted(root):
                 failed = failed_tests(oracles, root)
-            rows.append({"fault": fault.name, "file": fault.file} | failed)
+            found = {oracle: test or "none" for oracle, test in failed.items()}
+            rows.append({"fault": fault.name, "file": fault.file} | found)
             pd.DataFrame(rows).to_csv(options.out, index=False)
             caught = [oracle for oracle, test in failed.items() if test]
             print(fault.name, ", ".join(caught) or "no oracle", sep=": ", flush=True)

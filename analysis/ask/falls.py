@@ -27,10 +27,10 @@ from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
 from dess.analysis.stats.differences import (
     Paired,
-    add_adjusted,
     compare,
     compare_pairs,
     differences_of,
+    for_choice,
     t_test,
 )
 from dess.analysis.stats.kinds import LEVEL
@@ -249,7 +249,8 @@ def setting_fall_facts(results: Results) -> list[Fact]:
 def find_setting_falls(results: Results) -> list[Fall]:
     """Where settings collect significantly less than those with the next fewer UAVs or pads.
 
-    The p-values are corrected for all these pairs of settings. Where missions have a quota, a UAV
+    The p-values are corrected for all pairs of settings (Bonferroni), of which only those that fall
+    are tested. Where missions have a quota, a UAV
     that is added cannot stay unused, so that nothing is said.
 
     Args:
@@ -269,15 +270,17 @@ def find_setting_falls(results: Results) -> list[Fall]:
         wide = by_replication(of_policy, RATIO, "point")
         for field, fewer, more in pairs:
             values = wide.reindex(columns=[more, fewer]).dropna().to_numpy(float)
-            if len(values) > 1:
+            if len(values) > 1 and values[:, 0].mean() < values[:, 1].mean() - LITTLE:
                 change = compare_pairs(values[:, 0], values[:, 1], metric=RATIO)
                 rows.append((policy, field, fewer, more, *change))
     columns = ["policy", "field", "fewer", "more", *Paired._fields]
-    table = add_adjusted(pd.DataFrame(rows, columns=columns), "holm")
+    table = pd.DataFrame(rows, columns=columns)
     if table.empty:
         return []
+    table = table.assign(p_adjusted=table["p"], p_student_adjusted=table["p_student"])
+    table = for_choice(table, len(pairs) * missions["policy"].nunique())
     table["verdict"] = [better_or_worse(verdict, RATIO) for verdict in judge_by_tests(table)]
-    worse = table[table["verdict"].isin([WORSE, SEEN_WORSE]) & (table["difference"] < -LITTLE)]
+    worse = table[table["verdict"].isin([WORSE, SEEN_WORSE])]
     falls = []
     for (policy, _), of_field in worse.groupby(["policy", "field"], sort=False):
         row = of_field.loc[of_field["difference"].idxmin()]
