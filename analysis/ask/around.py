@@ -315,8 +315,9 @@ def _deciding_fact(results: Results) -> Fact:
 def _compared_metrics(results: Results) -> list[Metric]:
     """The metrics by which changes are compared: what is required, and of years the age."""
     metrics = [requirement.metric for requirement in requirements_of(results)]
-    if results.study.years and AGE not in results.study.selection.requirements:
-        metrics.append(_age_metric(results))
+    age = _age_metric(results)
+    if results.study.years and age.column not in [metric.column for metric in metrics]:
+        metrics.append(age)
     return metrics
 
 

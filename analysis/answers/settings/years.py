@@ -58,7 +58,9 @@ def years_of_setting(results: Results, policy: str, point: int) -> pd.DataFrame:
     table = rows[["replication", *names]].assign(lost=rows["replication"].map(lost))
     of_replications = years_of(results.scenario(point), results.store.manifest.seed)
     table.insert(0, "year", [of_replications[r].year for r in table["replication"]])
-    of_months = rows[[*AGES_OF_MONTHS]] * size_of("h", results.scenario(point).units)
+    units = results.scenario(point).units
+    assert units
+    of_months = rows[[*AGES_OF_MONTHS]] * size_of("h", units)
     return table.join(of_months).sort_values("year", ignore_index=True)
 
 

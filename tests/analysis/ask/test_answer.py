@@ -273,7 +273,7 @@ def test_what_contradicts_the_mean_is_told_by_pairs_and_failures(answer):
     missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
     variation = replace(made, results=replace(made.results, missions=missions)).variation
     row = row_of(0.5, -0.1, -0.3, 0.1)
-    said = found_of(variation._product_facts(row))
+    said = found_of(variation._leading_facts(row))
     assert said["100 pairs with greedy"] == "better in 75.0 %, worse in 25.0 %"
     assert said["failed missions with greedy"] == "0 before, 1 after"
 
@@ -308,7 +308,7 @@ def test_the_best_policy_of_each_side_is_found(answer):
     ],
 )
 def test_a_difference_is_told_with_its_verdict_or_how_many_missions_it_takes(answer, ends, said):
-    facts = found_of(answer.variation._product_facts(row_of(0.9, *ends)))
+    facts = found_of(answer.variation._leading_facts(row_of(0.9, *ends)))
     assert facts["product with greedy"] == said
     needed = facts.get("missions to show it with greedy")
     assert needed == (None if ends[1] * ends[2] > 0 else "about 820 for a probability of 80 %")
