@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from dess import InputError
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings import years
 from dess.analysis.answers.settings.ranking import ranking_metric
@@ -142,6 +143,12 @@ def test_changes_are_asked_in_few_years(asked, monkeypatch):
     monkeypatch.setattr(around, "YEARS", 1)
     asked_again = around.question_around(asked.results, asked.question.study.scenario)
     assert asked_again.study.years == 1
+
+
+def test_a_search_needs_two_years(tmp_path):
+    asked_for = ASKED | {"years": 1, "folder": tmp_path}
+    with pytest.raises(InputError, match="years: 1 is too few; allowed: 2 or more"):
+        sweep_question({"uavs": (1, 2)}, write_years(tmp_path), ["greedy"], **asked_for)
 
 
 def test_settings_of_years_are_ranked_by_the_age(asked):
