@@ -81,6 +81,7 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
         "failures": failures if sheet.mtbf or "mtbf" in varied else "none",
     }
     if space.weather.is_on:
+        del facts["battery"]  # the window says it
         facts["means"] = "over years, with 95 % intervals"
     else:
         facts["mission"] = given("horizon", printed(space.max_slots * units.slot, "s"))
@@ -152,13 +153,13 @@ def _weather_of(space: ScenarioSpace, wind: str) -> dict[str, str]:
         return {"wind": f"{wind}, the same everywhere and always"}
     limits = [f"{name} {value}" for name, value in weather.limits.items()]
     speed = space.data_sheet.max_speed
-    operating = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
+    known = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
+    operating = known.get(weather.operating) or f"{weather.operating}, solar time"
     return {
         "weather": f"hour by hour, {weather.path.name}; the same everywhere in the sea",
         "wind": f"of the hour, from {weather.height} to the altitude by a power law (0.11); UAVs "
         f"fly if {speed} through the air are enough for all moves",
-        "limits": ", ".join(limits) or "none but the wind",
-        "operating": operating.get(weather.operating) or f"{weather.operating}, solar time",
+        "operating": f"{operating}; limits: {', '.join(limits) or 'none but the wind'}",
         "window": f"open hours in a row, at most {weather.longest}, whose weather policy and "
         "return guard know beforehand; each move takes the most that it takes in one of its hours",
         "lost UAVs": _replaced(space),
@@ -176,8 +177,6 @@ def _replaced(space: ScenarioSpace) -> str:
 
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery."""
-    if space.weather.is_on:
-        return "what a slot takes follows from the winds of the window"
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "what a slot takes follows from the speed through the air"
     return battery_sentence(space)

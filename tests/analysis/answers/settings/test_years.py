@@ -104,8 +104,7 @@ def test_assumptions_tell_the_weather(asked):
     assumed = found_of(asked.assumptions())
     assert assumed["weather"].startswith("hour by hour, weather.csv")
     assert "20 m/s through the air" in assumed["wind"]
-    assert assumed["limits"] == "waves 1.5 m"
-    assert assumed["operating"] == "08:00-10:00, solar time"
+    assert assumed["operating"] == "08:00-10:00, solar time; limits: waves 1.5 m"
     assert assumed["window"].startswith("open hours in a row, at most 2 h")
     assert assumed["data at the start"].startswith("2 MB at the beginning of a year")
 
