@@ -68,11 +68,13 @@ def weather_facts(space: ScenarioSpace) -> dict[str, Any]:
 def weather_lines(space: ScenarioSpace) -> list[str]:
     """``weather_facts`` in lines."""
     facts = weather_facts(space)
-    found = facts["years"]
+    whole_years = facts["years"]
     about = f"weather: {facts['hours']:,} hours"
-    if found:
-        number = numbers.format_count(len(found), "whole year")
-        span = str(found[0]) if len(found) == 1 else f"{found[0]} to {found[-1]}"
+    if whole_years:
+        number = numbers.format_count(len(whole_years), "whole year")
+        span = str(whole_years[0])
+        if len(whole_years) > 1:
+            span = f"{whole_years[0]} to {whole_years[-1]}"
         about += f" with {number}, {span}"
     else:
         about += " without a whole calendar year, so that no year can be simulated"
@@ -85,7 +87,7 @@ def weather_lines(space: ScenarioSpace) -> list[str]:
     windows = f"{facts['windows']:,.0f} windows of at most {space.weather.longest}"
     gap = facts["longest_gap_h"]
     gaps = f"the longest gap is {gap['largest']:g} h"
-    if len(found) > 1:
+    if len(whole_years) > 1:
         windows = windows.replace(" of", " a year, each of", 1)
         gaps = f"the longest gap of a year is {gap['median']:g} h in the median, "
         gaps += f"{gap['largest']:g} h at most"
