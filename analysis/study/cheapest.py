@@ -385,7 +385,13 @@ class Cheapest(StrictTable):
         )
 
     def of_years(self, years: int, points: int) -> Self:
-        """The rule where every one of so many points has all of so many years at once."""
+        """The rule where every one of so many points has all of so many years at once.
+
+        Raises:
+            InputError: If the years are too few.
+        """
+        if years < 2:
+            raise InputError("years", f"{years} is too few", "2 or more, for a selection")
         return self.model_copy(update={"first": years, "budget": years * points, "check": 0})
 
     def shown(self, policies: int = 1) -> float:
