@@ -433,7 +433,8 @@ class Cheapest(StrictTable):
             f"{low}. No setting that is said to miss them has {high}. The selected setting costs "
             f"at most {saving} more than any that has {high}. The statement on costs takes "
             "the differences of costs as nearly normal, apart from the losses of UAVs; where a "
-            "rare mission is much more expensive than the others, it holds less often"
+            f"rare {'year' if is_of_years else 'mission'} is much more expensive than the others, "
+            "it holds less often"
         )
         if all(question.answer.settled for question in search.questions):
             return words
