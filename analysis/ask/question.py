@@ -28,6 +28,7 @@ from dess.analysis.execution.runner import Round, run_study
 from dess.analysis.metrics import (
     AGE,
     ALIASES,
+    LATE,
     LEAST,
     METRICS,
     OLDEST,
@@ -309,7 +310,7 @@ def _cheapest_rule(
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)
         if full not in get_args(Required):
-            names = [*METRICS, *ALIASES, AGE, LEAST, OLDEST]
+            names = [*METRICS, *ALIASES, AGE, LEAST, OLDEST, LATE]
             raise unknown_name("requirements", f"{metric!r} is unknown", metric, names)
         least[full] = share
     spaces = study.scenarios

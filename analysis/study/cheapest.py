@@ -14,9 +14,12 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.metrics import (
     AGE,
+    LATE,
     LEAST,
     NODES_BEHIND,
     OLDEST,
+    PRODUCT,
+    RATIO,
     column_in_sheet_unit,
     metric_of,
     size_of,
@@ -162,10 +165,19 @@ def group_points(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[s
 FURTHER, MOST_FURTHER = 64, 10_000_000
 
 Required = Literal[
-    "success", "collection_ratio", "collection_ratio_and_communication", "age", "least", "oldest"
+    "success",
+    "collection_ratio",
+    "collection_ratio_and_communication",
+    "age",
+    "least",
+    "oldest",
+    "late",
 ]
 _AGES = (AGE, OLDEST)
 _OF_NODES = (LEAST, OLDEST)
+# What tends to 1 in a year, and what only years measure.
+_NOT_OF_YEARS = (RATIO, PRODUCT, LEAST)
+_OF_YEARS = (LATE,)
 
 
 class Setting(NamedTuple):
@@ -204,7 +216,8 @@ def horizon_of(space: ScenarioSpace) -> float:
 
 
 def as_share(metric: str, value: Any, horizon: float) -> Any:
-    """Values of a metric as shares of which more is better: an age as what is left of the horizon.
+    """Values of a metric as shares of which more is better: an age as what is left of the horizon,
+    late data as those that are not.
 
     Args:
         metric: What is required.
@@ -213,6 +226,8 @@ def as_share(metric: str, value: Any, horizon: float) -> Any:
     """
     if metric in _AGES:
         return 1 - value / horizon
+    if metric == LATE:
+        return 1 - value
     return value
 
 
@@ -323,6 +338,11 @@ class Cheapest(StrictTable):
         """
         for metric in self.requirements:
             for space in spaces:
+                where = f"requirements.{metric}"
+                if metric in _NOT_OF_YEARS and space.weather.is_on:
+                    raise InputError(where, "tends to 1 in a year", "age, oldest, late or success")
+                if metric in _OF_YEARS and not space.weather.is_on:
+                    raise InputError(where, "is not measured", "a scenario with weather")
                 if metric in _OF_NODES and not space.units:
                     raise InputError(
                         f"requirements.{metric}", "is not measured", "a scenario with a data sheet"
@@ -451,7 +471,9 @@ class Cheapest(StrictTable):
             name = metric.replace("_", " ")
             if metric in _OF_NODES:
                 name = metric_of(metric).within
-            if metric in _AGES or isinstance(amount, str):
+            if metric == LATE and not isinstance(amount, str):
+                means.append(f"share of late data of at most {amount - shift:g}")
+            elif metric in _AGES or isinstance(amount, str):
                 means.append(f"{name} of at most {amount} {sign} {abs(shift):g} {whole}")
             else:
                 means.append(f"{name} of at least {amount + shift:g}")

@@ -9,8 +9,9 @@ from scipy import stats
 from dess import InputError
 from dess.analysis import load_study
 from dess.analysis.results.manifest import Manifest
-from dess.analysis.study.cheapest import Cheapest, Setting, _Search
+from dess.analysis.study.cheapest import Cheapest, Setting, _Search, as_share
 from dess.analysis.study.prices import PARTS, Costs, spent_battery, stranded_uavs
+from dess.analysis.study.study import study_from
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.analysis.stats.test_betting import most
 from tests.analysis.study.test_selection import check_that_interruptions_leave_no_trace
@@ -261,3 +262,23 @@ def test_the_budget_is_kept():
 @pytest.mark.parametrize("problem", [RARE, CONDITIONS], ids=["rare", "conditions"])
 def test_interruptions_leave_no_trace(problem, budget):
     check_that_interruptions_leave_no_trace(rule(budget=budget), *problem)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "metric", "amount", "line"),
+    [
+        ("new-jersey", "collection_ratio", 0.8, "tends to 1 in a year; allowed: age, oldest, late"),
+        ("jade-bight", "late", 0.1, "is not measured; allowed: a scenario with weather"),
+    ],
+)
+def test_what_years_do_not_decide_and_missions_do_not_measure_is_refused(
+    scenario, metric, amount, line
+):
+    rule = {"procedure": "cheapest", "requirements": {metric: amount}, "indifference": 1}
+    about = {"scenario": scenario, "costs": {"uav": 1}, "policies": ["greedy"], "selection": rule}
+    with pytest.raises(InputError, match=f"requirements.{metric}: {line}"):
+        study_from({"name": "refused", **about}, "study")
+
+
+def test_late_data_are_required_at_most():
+    assert as_share("late", 0.1, 24.0) == 0.9 and as_share("success", 0.1, 24.0) == 0.1
