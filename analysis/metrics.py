@@ -215,7 +215,7 @@ FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].defa
 
 SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
-WINDOWS = "windows"  # of a year with weather
+WINDOWS, LATE = "windows", "late"  # of a year with weather
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
@@ -317,7 +317,7 @@ _GROUPS["operations"] = (
     Metric("failures", "Failures of UAVs", less_is_better=True, least=0.0, failure=1.0),
     _time_metric("slots_grounded", "Time under repair", is_sum=True),
     # Of years with weather.
-    Metric("late", "Late data", kind="share", less_is_better=True, in_percent=True),
+    Metric(LATE, "Late data", kind="share", less_is_better=True, in_percent=True),
     Metric("open", "Open hours", kind="share", is_neutral=True, in_percent=True),
     _amount_metric(WINDOWS, "Windows a year", neutral=True),
     _amount_metric("longest_gap", "Longest gap", "h", neutral=True),
@@ -405,6 +405,21 @@ def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 
     return replace(metric, most=longest)
 
 
+def are_years(missions: pd.DataFrame) -> bool:
+    """Whether the rows of a table of missions are years with weather."""
+    return WINDOWS in missions and not missions[WINDOWS].isna().all()
+
+
+def usual_metric(missions: pd.DataFrame) -> str:
+    """The column that ranks what was simulated: of missions the product, of years the age.
+
+    The collection ratio of a year tends to 1, whatever flies.
+    """
+    if are_years(missions):
+        return column_in_sheet_unit(AGE, missions)
+    return PRODUCT
+
+
 def metric_of_years(metric: Metric) -> Metric:
     """The same metric of years with weather, of which each has hundreds of missions.
 
@@ -444,7 +459,7 @@ def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
     metric = metric_of(column)
     if not len(missions):
         return metric
-    if WINDOWS in missions and not missions[WINDOWS].isna().all():
+    if are_years(missions):
         metric = metric_of_years(metric)
     nodes = NODES_BEHIND.get(column)
     if nodes in missions:

@@ -137,6 +137,7 @@ _OTHERS = (  # that studies vary
     Field("failures.node_rate", "Failure rate of a node", "Node failures", "per mission slot"),
     Field("wind.strength", "Wind", "Wind", "% battery per move"),
     Field("data_sheet.mtbf", "Mean time between failures", "Failures"),
+    Field("data_sheet.spares", "Spare UAVs", "Spares", counted="spare UAV"),
 )
 _KNOWN = {field.key: field for field in (*_PAPER, *_OTHERS)}
 PARAMETERS = {field.key: field for field in _PAPER}

@@ -1,17 +1,21 @@
 """What the hourly weather of a scenario leaves to UAVs: as numbers for programs, and in lines."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from dess.analysis import numbers
 from dess.base.errors import listed
 from dess.scenario.scenario import ScenarioSpace
-from dess.scenario.weather.hours import Year, hours_of, years
+from dess.scenario.weather.hours import State, Year, hours_of, years
 from dess.scenario.weather.windows import longest_gap, shares_of, windows_of
 
+OPEN, NIGHT = "open", "night"
 # What closes an hour in words, by the name of its share; others are limits.
-_CLOSED = {"night": "not operating", "missing": "without a value", "wind": "too windy to fly"}
+_CLOSED = {NIGHT: "not operating", "missing": "without a value", "wind": "too windy to fly"}
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 
 _LEAST = 0.0005  # the least share that a line tells
 
@@ -64,24 +68,26 @@ def weather_facts(space: ScenarioSpace) -> dict[str, Any]:
 def weather_lines(space: ScenarioSpace) -> list[str]:
     """``weather_facts`` in lines."""
     facts = weather_facts(space)
-    found = facts["years"]
+    whole_years = facts["years"]
     about = f"weather: {facts['hours']:,} hours"
-    if found:
-        number = numbers.format_count(len(found), "whole year")
-        span = str(found[0]) if len(found) == 1 else f"{found[0]} to {found[-1]}"
+    if whole_years:
+        number = numbers.format_count(len(whole_years), "whole year")
+        span = str(whole_years[0])
+        if len(whole_years) > 1:
+            span = f"{whole_years[0]} to {whole_years[-1]}"
         about += f" with {number}, {span}"
     else:
         about += " without a whole calendar year, so that no year can be simulated"
     closed = [
-        f"{100 * share:.1f} % {_CLOSED.get(name) or f'beyond {name}'}"
+        f"{100 * share:.1f} % {reason_in_words(name)}"
         for name, share in facts["shares"].items()
-        if name != "open" and share >= _LEAST
+        if name != OPEN and share >= _LEAST
     ]
     is_open = f"{100 * facts['shares']['open']:.1f} % of the hours are open"
     windows = f"{facts['windows']:,.0f} windows of at most {space.weather.longest}"
     gap = facts["longest_gap_h"]
     gaps = f"the longest gap is {gap['largest']:g} h"
-    if len(found) > 1:
+    if len(whole_years) > 1:
         windows = windows.replace(" of", " a year, each of", 1)
         gaps = f"the longest gap of a year is {gap['median']:g} h in the median, "
         gaps += f"{gap['largest']:g} h at most"
@@ -92,3 +98,36 @@ def weather_lines(space: ScenarioSpace) -> list[str]:
         rows = f", {facts['without_row']:,} of them without a row" if facts["without_row"] else ""
         lines.append(f"hours without a value: {listed(named)}{rows}")
     return lines
+
+
+def reason_in_words(name: str) -> str:
+    """What closes an hour in words, by the name of its share in ``weather_facts``."""
+    return _CLOSED.get(name) or f"beyond {name}"
+
+
+def hours_by_month(space: ScenarioSpace, chosen: Iterable[Year]) -> pd.DataFrame:
+    """How many hours of a day are open in every month, and what closes the others.
+
+    Args:
+        space: A scenario with ``[weather]``.
+        chosen: Years of its weather, of which the means are taken.
+
+    Returns:
+        A row per month, with a column of hours a day for ``open`` and for each reason that closes
+        an hour. The sum of a row is 24.
+
+    Raises:
+        InputError: As ``hours_of``.
+    """
+    hours = hours_of(space)
+    names = {int(State.OPEN): OPEN} | hours.names
+    counts = np.zeros((12, max(names) + 1))
+    for year in chosen:
+        begin = np.datetime64(f"{year.year}-01-01T00", "h")
+        of_year = begin + np.arange(year.hours)
+        months = of_year.astype("datetime64[M]").astype(int) % 12
+        np.add.at(counts, (months, hours.state[year.first : year.first + year.hours]), 1)
+    shares = counts / counts.sum(axis=1, keepdims=True)
+    return pd.DataFrame(
+        {name: 24 * shares[:, state] for state, name in names.items()}, index=MONTHS
+    )

@@ -132,12 +132,17 @@ def changes_from_reference(
             if both.empty:
                 continue
             pairs = both[point].to_numpy(float), both[partner].to_numpy(float)
-            own, there = (measure.at(wide.columns.get_loc(name)) for name in (point, partner))
+            metric_at_point, metric_at_partner = (
+                measure.at(wide.columns.get_loc(name)) for name in (point, partner)
+            )
             if relative:
                 plain = relative_change(*pairs)
-                change = (*relative_change(*pairs, own, there), (plain.high - plain.low) / 2)
+                change = (
+                    *relative_change(*pairs, metric_at_point, metric_at_partner),
+                    (plain.high - plain.low) / 2,
+                )
             else:
-                pair = compare_pairs(*pairs, metric=own, metric_of_b=there)
+                pair = compare_pairs(*pairs, metric=metric_at_point, metric_of_b=metric_at_partner)
                 change = (*pair[:3], pair.student)
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "student", "n"])

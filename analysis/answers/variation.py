@@ -39,6 +39,7 @@ from dess.analysis.metrics import (
     limit_of,
     measured_in,
     metric_of,
+    usual_metric,
 )
 from dess.analysis.names import RANGES, described_field, field_in_words, field_named, sum_in_words
 from dess.analysis.results.resimulate import resimulate
@@ -225,15 +226,15 @@ def missions_needed(answer: Any) -> float:
     return float(np.ceil(root**2))
 
 
-def product_differences(results: Results, policy: str) -> pd.Series:
-    """Variation - baseline in product of a policy, by replication."""
+def paired_differences(results: Results, policy: str, metric: str = PRODUCT) -> pd.Series:
+    """Variation - baseline in a metric of a policy, by replication."""
     missions = results.missions_of(policy)
-    sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
+    sides = missions.pivot(index="replication", columns="point", values=metric)
     return sides[VARIATION] - sides[BASELINE]
 
 
 def best_policy_of_side(results: Results, point: int) -> str:
-    """The policy with the highest mean product on one side."""
+    """The best policy on one side, by ``summary.best_policy``."""
     missions = results.missions
     return ranks.best_policy(missions[missions["point"] == point])
 
@@ -292,13 +293,24 @@ class Variation:
         """The paired differences, with a row per policy and metric, as ``compare_sides``."""
         return compare_sides(self.results)
 
-    def _of_product(self) -> Iterable[Any]:
-        """The rows of the table on the product, one per policy."""
+    @property
+    def _leading(self) -> Metric:
+        """The metric that the answer is about: the product, or of years the age of the data."""
+        return metric_of(usual_metric(self.results.missions))
+
+    def _of_leading(self) -> Iterable[Any]:
+        """The rows of the table on the leading metric, one per policy."""
         table = self.table()
-        return table[table["metric"] == PRODUCT].itertuples()
+        return table[table["metric"] == self._leading.column].itertuples()
+
+    def _change_of_leading(self, row: Any) -> str:
+        """The difference of the leading metric with its unit, of a row of ``compare_sides``."""
+        if self._leading.in_percent:
+            return f"{format_change(row)} points"
+        return self._leading.change(row.difference, row.low, row.high)
 
     def headline(self) -> str:
-        """What is changed, and by how much that changes the product of the shown policy."""
+        """What is changed, and by how much that changes the leading metric of the shown policy."""
         changes = [
             f"{field_named(side.Field).words(side.Variation)} instead of {side.Baseline}"
             for side in self._fields(self._changed).itertuples()
@@ -306,14 +318,15 @@ class Variation:
         changed = numbers.join_words(changes)
         if len(changes) > _MOST_NAMED:
             changed = f"{len(changes)} changed fields"
-        (row,) = (row for row in self._of_product() if row.policy == self.shown)
-        return f"{changed}: product with {self.shown} {format_change(row)} points."
+        (row,) = (row for row in self._of_leading() if row.policy == self.shown)
+        metric = self._leading.within
+        return f"{changed}: {metric} with {self.shown} {self._change_of_leading(row)}."
 
     def facts(self) -> list[Fact]:
-        """How the product of every policy changes, by the mean and in how many missions."""
+        """How the leading metric of every policy changes, by the mean and in how many missions."""
         facts = []
-        for row in self._of_product():
-            facts += self._product_facts(row)
+        for row in self._of_leading():
+            facts += self._leading_facts(row)
         table = self.table()
         for row in table[table["metric"] == COST].itertuples():
             unit = self.results.prices.unit
@@ -330,36 +343,41 @@ class Variation:
         ]
         return known_facts(facts)
 
-    def _product_facts(self, row: Any) -> list[Fact]:
-        """What a row of ``compare_sides`` on the product says of its policy.
+    def _leading_facts(self, row: Any) -> list[Fact]:
+        """What a row of ``compare_sides`` on the leading metric says of its policy.
 
         A failed mission counts 0 in the product, so that a few of them can outweigh many small
         gains: the product may be higher in most missions and lower on average.
         """
         policy = row.policy
         verdict = judge_difference(row)
-        before, after = map(numbers.format_percent, (row.before, row.after))
-        gaps = product_differences(self.results, policy)
+        metric = self._leading
+        before, after = map(metric.write, (row.before, row.after))
+        gaps = paired_differences(self.results, policy, metric.column)
+        if metric.less_is_better:
+            gaps = -gaps
         better, worse = (numbers.format_percent(share.mean()) for share in (gaps > 0, gaps < 0))
         missions = self.results.missions_of(policy)
         failures = (1 - missions[SUCCESS]).groupby(missions["point"]).sum().astype(int)
-        change = f"{format_change(row)} points, {_VERDICTS[verdict]}"
+        change = f"{self._change_of_leading(row)}, {_VERDICTS[verdict]}"
         facts = [
-            Fact(f"product with {policy}", f"{change}; {before} before, {after} after"),
+            Fact(f"{metric.within} with {policy}", f"{change}; {before} before, {after} after"),
             Fact(f"{row.n:,} pairs with {policy}", f"better in {better}, worse in {worse}"),
         ]
-        if failures.any():
+        name = self.results.study.replication_name
+        if failures.any() and not self.results.study.years:
             counts = f"{failures[BASELINE]:,} before, {failures[VARIATION]:,} after"
             facts.append(Fact(f"failed missions with {policy}", counts))
         if verdict not in (ABOVE, BELOW):
-            facts.append(Fact(f"missions to show it with {policy}", _missing_in_words(row)))
+            facts.append(Fact(f"{name}s to show it with {policy}", _missing_in_words(row)))
         return facts
 
     def _best(self, point: int) -> str:
         """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
         policy = best_policy_of_side(self.results, point)
-        mean = estimate_metric(self.results, policy, point=point)
-        return f"{policy}, {numbers.format_estimate(mean)}"
+        metric = self._leading
+        mean = estimate_metric(self.results, policy, metric.column, point)
+        return f"{policy}, {metric.written(*mean[['mean', 'low', 'high']])}"
 
     @property
     def _changed(self) -> dict[str, Any]:
@@ -423,7 +441,8 @@ class Variation:
                 difference = f"{MARKS[judge_difference(row)]} {format_change(row)}{unit}"
             lines.append([name, *sides, difference])
         heads = [policy, "Baseline", "Variation", "Paired difference"]
-        caption = f"Means per mission with {policy}, n = {rows['n'].max():,}; {_MARKED}"
+        name = self.results.study.replication_name
+        caption = f"Means per {name} with {policy}, n = {rows['n'].max():,}; {_MARKED}"
         return Table(pd.DataFrame(lines, columns=heads), caption, rows)
 
     def pairing(self) -> pd.DataFrame:
@@ -483,7 +502,7 @@ class Variation:
         """In how many missions the product differs with each policy, in a sentence."""
         parts = []
         for policy in self.results.policies:
-            gaps = product_differences(self.results, policy)
+            gaps = paired_differences(self.results, policy)
             better, worse = (numbers.format_percent(part.mean()) for part in (gaps > 0, gaps < 0))
             parts.append(f"with {policy} higher in {better} and lower in {worse} of the pairs")
         return f"Product in the variation: {'; '.join(parts)}. "
@@ -511,7 +530,7 @@ class Variation:
 
         policies = self.results.policies
         return comparison.plot_difference_spread(
-            {policy: product_differences(self.results, policy) for policy in policies}
+            {policy: paired_differences(self.results, policy) for policy in policies}
         )
 
     def typical(self) -> "Example":
@@ -520,7 +539,7 @@ class Variation:
         With an even number it is the lower one of the two in the middle; among equal ones, the
         first.
         """
-        ordered = product_differences(self.results, self.shown).sort_values(kind="stable")
+        ordered = paired_differences(self.results, self.shown).sort_values(kind="stable")
         median = ordered.iloc[(len(ordered) - 1) // 2]
         return Example(self, int(ordered.index[ordered == median][0]))
 
@@ -557,7 +576,7 @@ class Example:
         """By how much the variation changes the mission, in a sentence of Markdown."""
         policy = self.variation.shown
         gap = numbers.format_difference(
-            product_differences(self.variation.results, policy)[self.replication], 0
+            paired_differences(self.variation.results, policy)[self.replication], 0
         )
         return (
             f"Replication {self.replication} with **{policy}**: the variation changes the product "

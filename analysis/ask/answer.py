@@ -21,6 +21,7 @@ from dess.analysis.answers.settings.ranking import (
     best_setting_headline,
     rank_settings,
     ranked_table,
+    ranking_metric,
 )
 from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of_side
 from dess.analysis.ask import around
@@ -111,14 +112,14 @@ class SweepAnswer(Answer):
     """The settings of a sweep, the best first. A setting is a policy with values of swept fields.
 
     Attributes:
-        metric: The metric that ranks the settings; None for the product.
+        metric: The metric that ranks the settings; None for that of ``ranking_metric``.
     """
 
     metric: str | None = None
 
     @property
     def _ranking_metric(self) -> str:
-        return self.metric or PRODUCT
+        return ranking_metric(self.results, self.metric)
 
     def headline(self) -> str:
         """The best setting and its mean."""

@@ -13,6 +13,7 @@ from dess.physics.fleet import IN_UNITS
 from dess.scenario.data_sheet import LORA, DataSheet, lora
 from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.weather import ALWAYS, DAYLIGHT
 
 
 def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
@@ -56,11 +57,12 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     else:
         end = "is lost for good"
     failures = f"a UAV fails every {given('mtbf', '')} of flying on average, and {end}"
+    flight = "window" if space.weather.is_on else "mission"
     facts = {
-        "success": f"at the end of a mission every UAV has landed{quota}",
-        "slot": f"{printed(units.slot, 's')}, a hundredth of the endurance of "
-        f"{given('endurance', '')}; once a slot every UAV moves by a cell, hovers or charges",
-        "cell": f"{printed(units.cell, 'm')} wide, the way of a slot at {given('cruise', '')}",
+        "success": f"at the end of a {flight} every UAV has landed{quota}",
+        "slot": f"{_slot_of(space, varied)}; once a slot every UAV moves by a cell, hovers or "
+        "charges",
+        "cell": _cell_of(space, varied),
         "sea": f"{wide} x {high}",
         "policy": f"{_policy_of(results, metric)}, which knows the data left at every node",
         "altitude": f"{value_text(space.altitude)} m",
@@ -68,22 +70,110 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
         "reserve": given("reserve", "none"),
         "data": f"{given('data_rate', listed)} at each of {nodes} in messages of "
         f"{given('message', sheet.assumed.get('message', ''))}",
-        "data at the start": given("backlog", listed if space.arrivals.initial else "none"),
+        "data at the start": _data_at_the_start(space, varied, given("backlog", ""), listed),
         "radio": f"SNR {given('snr', 'of a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}, range {given('range', 'without end')}; "
         f"{given('bandwidth', '')}, {_rates_of(space, varied)}{duty}",
-        "wind": f"{given('wind', 'none')}, the same everywhere and always",
+        **_weather_of(space, given("wind", "none")),
         "battery": _battery_of(space, varied),
         **_types_of(space, varied),
         "failures": failures if sheet.mtbf or "mtbf" in varied else "none",
-        "mission": given("horizon", printed(space.max_slots * units.slot, "s")),
-        "means": "over random missions, with 95 % intervals",
     }
+    if space.weather.is_on:
+        facts["means"] = "over years, with 95 % intervals"
+    else:
+        facts["mission"] = given("horizon", printed(space.max_slots * units.slot, "s"))
+        facts["means"] = "over random missions, with 95 % intervals"
     return [Fact(label, found) for label, found in facts.items()]
+
+
+def _slot_of(space: ScenarioSpace, varied: set[str]) -> str:
+    """How long a slot is, and what it follows from."""
+    sheet, units = space.data_sheet, space.units
+    assert units
+    if "cruise" in varied:
+        return "the time in which a UAV crosses a cell at its cruising speed"
+    if sheet.cell or "cell" in varied:
+        return f"{printed(units.slot, 's')}, in which a UAV crosses a cell at {sheet.cruise}"
+    endurance = "as asked" if "endurance" in varied else sheet.endurance
+    return f"{printed(units.slot, 's')}, a hundredth of the endurance of {endurance}"
+
+
+def _cell_of(space: ScenarioSpace, varied: set[str]) -> str:
+    """How wide a cell is, and what it follows from."""
+    sheet, units = space.data_sheet, space.units
+    assert units
+    if "cell" in varied:
+        return "as wide as asked"
+    if sheet.cell:
+        return f"{printed(units.cell, 'm')} wide at any cruising speed"
+    return f"{printed(units.cell, 'm')} wide, the way of a slot at {sheet.cruise}"
+
+
+def _data_at_the_start(space: ScenarioSpace, varied: set[str], backlog: str, listed: str) -> str:
+    """Which data nodes have when a mission begins, and how old they are.
+
+    Args:
+        space: A scenario.
+        varied: The fields of the sheet that its design varies.
+        backlog: The backlog in words; empty if there is none.
+        listed: What the file of the nodes has, in words.
+    """
+    sheet, units = space.data_sheet, space.units
+    assert units
+    if not backlog and space.arrivals.initial:
+        backlog = listed
+    if space.weather.is_on:
+        first = backlog or "none, of age 0"
+        return f"{first} at the beginning of a year; a window has those left before it, and newer"
+    if "idle" in varied:
+        return "those of an idle time as asked"
+    if sheet.idle:
+        more = f"{backlog}, and " if backlog else ""
+        return f"{more}those of {sheet.idle} without a mission, which is their age"
+    hours = 24 - space.max_slots * units.slot / 3600
+    told = f"{backlog or 'none'}, of age 0, as if UAVs had just emptied all nodes"
+    if hours < 1:
+        return told
+    return (
+        f"{told}; a service of once a day finds the data of {hours:.3g} h more, which are up to "
+        f"{hours:.3g} h old (idle)"
+    )
+
+
+def _weather_of(space: ScenarioSpace, wind: str) -> dict[str, str]:
+    """The wind of missions, or the weather of years and when UAVs fly in it."""
+    weather = space.weather
+    if not weather.is_on:
+        return {"wind": f"{wind}, the same everywhere and always"}
+    limits = [f"{name} {value}" for name, value in weather.limits.items()]
+    speed = space.data_sheet.max_speed
+    operating = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
+    return {
+        "weather": f"hour by hour, {weather.path.name}; the same everywhere in the sea",
+        "wind": f"of the hour, from {weather.height} to the altitude by a power law (0.11); UAVs "
+        f"fly if {speed} through the air are enough for all moves",
+        "limits": ", ".join(limits) or "none but the wind",
+        "operating": operating.get(weather.operating) or f"{weather.operating}, solar time",
+        "window": f"open hours in a row, at most {weather.longest}, whose weather policy and "
+        "return guard know beforehand; each move takes the most that it takes in one of its hours",
+        "lost UAVs": _replaced(space),
+    }
+
+
+def _replaced(space: ScenarioSpace) -> str:
+    """What takes the place of a lost UAV in a year."""
+    sheet = space.data_sheet
+    after = f"a new one comes after {printed(sheet.delivery_ms / 1000, 's')}"
+    if not sheet.spares:
+        return after
+    return f"{numbers.format_count(sheet.spares, 'spare')}, with none left {after}"
 
 
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery."""
+    if space.weather.is_on:
+        return "what a slot takes follows from the winds of the window"
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "what a slot takes follows from the speed through the air"
     return battery_sentence(space)

@@ -157,12 +157,12 @@ def find_strongest_wind(fleet: TriedFleet) -> Limit:
     trials = {}
     while (speed := search.value) is not None:
         winds = [wind(speed, place) for place in places]
-        found = dict(zip(places, fleet.try_changes(winds), strict=True))
-        hardest = min(places, key=lambda place: found[place].room)
-        trials[speed] = found[hardest]
+        trial_of = dict(zip(places, fleet.try_changes(winds), strict=True))
+        hardest = min(places, key=lambda place: trial_of[place].room)
+        trials[speed] = trial_of[hardest]
         search.learn(speed, trials[speed].broken)
         if trials[speed].broken:  # wind from the other places may be stronger than this
-            places = [place for place in places if found[place].broken]
+            places = [place for place in places if trial_of[place].broken]
             worst = hardest
     digits = digits_of_limit(trials, search.broken)
     last = ""

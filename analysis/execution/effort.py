@@ -316,8 +316,9 @@ def check_run(
     if any(planned.missing + planned.logs for planned in plan):
         check_folder(Path(out))
     what = (
-        f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
-        f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
+        f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} "
+        f"{study.replication_name}s to simulate (policies: {teams}, design points: "
+        f"{study.size:,}, workers: {workers:,})"
     )
     if not yes and any(planned.missing + planned.logs for planned in plan):
         check_time(what, total_time(plan, workers))

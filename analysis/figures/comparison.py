@@ -81,7 +81,7 @@ def plot_difference_spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: For each policy the result of ``answers.variation.product_differences``.
+        differences: For each policy the result of ``answers.variation.paired_differences``.
     """
     with style.new_panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")

@@ -51,6 +51,9 @@ OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")
 BETTER, WORSE = "#0173b2", "#c05000"
 NAMED_PART = 0.05  # the smallest part of a bar in which its share is written
 PALE = 0.35  # the opacity of what a bar allows for rare failures
+# The hours of a day: those in which UAVs can fly, and the others by what closes them.
+OPEN_HOURS, CLOSED_HOURS = "#8ec5e8", {"night": "#45535f", "wind": WORSE, "missing": "#bcc7ce"}
+LIMITS = ("#d9a400", "#7b2fa0", "#00734d", "#b3123f")  # hours beyond limits of the weather
 ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference
 
 _LOOK = {

@@ -146,6 +146,11 @@ class Results:
         return self.store.manifest.study
 
     @property
+    def replications_head(self) -> str:
+        """The head of a column with numbers of missions or years."""
+        return f"{self.study.replication_name.capitalize()}s"
+
+    @property
     def prices(self) -> Costs:
         """The prices of the study.
 

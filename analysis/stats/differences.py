@@ -336,8 +336,8 @@ def column_tests(
         p = np.nan
         if measured.any():
             pairs = of_column[measured], of_baseline[measured]
-            own = measure.at(place)
-            ends, p = difference_test(*pairs, own, float(level), metric_of_baseline)
+            measure_there = measure.at(place)
+            ends, p = difference_test(*pairs, measure_there, float(level), metric_of_baseline)
         rows.append((*ends, p, measured.sum()))
     return pd.DataFrame(rows, values.columns, ["difference", "low", "high", "p", "n"])
 

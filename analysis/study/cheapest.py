@@ -417,7 +417,9 @@ class Cheapest(StrictTable):
     def _guarantee(self, search: "_Search") -> str:
         if not search.done:
             return "none yet: the procedure needs more missions"
-        low, high = (self._in_words(shift) for shift in (-self.tolerance, self.tolerance))
+        is_of_years = search.settings[0].is_of_years
+        ends = (-self.tolerance, self.tolerance)
+        low, high = (self._in_words(shift, is_of_years) for shift in ends)
         saving = numbers.format_money(self.indifference, search.settings[0].currency)
         words = (
             f"for each policy by itself, three statements hold together with a probability of at "
@@ -429,10 +431,13 @@ class Cheapest(StrictTable):
         )
         if all(question.answer.settled for question in search.questions):
             return words
+        if is_of_years:
+            return f"{words}; the years of the study ended before all was decided"
         return f"{words}; the budget of {self.budget} missions ended before all was decided"
 
-    def _in_words(self, shift: float) -> str:
+    def _in_words(self, shift: float, is_of_years: bool) -> str:
         """The requirements in words, such as ``a mean success of at least 0.985``."""
+        whole = "days" if is_of_years else "horizons"
         sign = "-" if shift > 0 else "+"
         means = []
         for metric, amount in self.requirements.items():
@@ -440,7 +445,7 @@ class Cheapest(StrictTable):
             if metric in _OF_NODES:
                 name = metric_of(metric).within
             if metric in _AGES or isinstance(amount, str):
-                means.append(f"{name} of at most {amount} {sign} {abs(shift):g} horizons")
+                means.append(f"{name} of at most {amount} {sign} {abs(shift):g} {whole}")
             else:
                 means.append(f"{name} of at least {amount + shift:g}")
         return f"a mean {' and a mean '.join(means)}"

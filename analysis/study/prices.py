@@ -192,6 +192,8 @@ class Costs(StrictTable):
             is_of_a_year = price in _OF_A_YEAR
             if is_of_types or (is_of_a_year and self.years is None):
                 continue
+            if price == "hour" and any(space.weather.is_on for space in spaces):
+                thing = "an hour of a window"
             amounts[thing] = ""
             if value:
                 amounts[thing] = numbers.format_money(value, self.currency)

@@ -173,6 +173,11 @@ class StudyData(StrictTable):
         return values
 
     @property
+    def replication_name(self) -> str:
+        """What a replication is: a ``mission``, or a ``year`` where scenarios have weather."""
+        return "year" if self.years else "mission"
+
+    @property
     def rule(self) -> Precision | AnySelection | None:
         """The rule that decides the number of replications; None if the number is fixed."""
         return self.precision or self.selection

@@ -16,12 +16,12 @@ def with_known_options(initialise: Callable[_P, None]) -> Callable[_P, None]:
     Args:
         initialise: The ``__init__``. Other keywords raise ``InputError``.
     """
-    known = [*signature(initialise).parameters][1:]
+    names = [*signature(initialise).parameters][1:]
 
     @wraps(initialise)
     def checked(*args: _P.args, **options: _P.kwargs) -> None:
         for name in options:
-            check_known("options", name, known)
+            check_known("options", name, names)
         initialise(*args, **options)
 
     return checked

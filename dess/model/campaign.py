@@ -264,8 +264,8 @@ class Campaign:
         for zone, pads in enumerate(self._working_pads()):
             free = [int(gap)] * pads
             budget = int(gap) * int(mission.power)
-            here = [uav for uav in self.fleet if uav.has_cell and uav.state["zone"] == zone]
-            for uav in sorted(here, key=lambda uav: (int(uav.state["battery"]), uav.number)):
+            parked = [uav for uav in self.fleet if uav.has_cell and uav.state["zone"] == zone]
+            for uav in sorted(parked, key=lambda uav: (int(uav.state["battery"]), uav.number)):
                 u = uav.state
                 lacking = min(int(charge_limit(mission, u)), int(mission.charge_complete))
                 lacking -= int(u["battery"])

@@ -65,7 +65,7 @@ def sweep(
         policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
             greedy]
         metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
-            what the scenario measures, such as age.  [default: product]
+            what the scenario measures, such as age.  [default: product, or age in years]
         missions: Missions per setting; with --require, additional missions that check each
             selected setting.
         price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
@@ -212,6 +212,7 @@ def _run_question(
         study.name,
         lambda progress, announce: question.ask(workers, progress, announce, yes),
         command_line("study", "run", question.file, out=folder),
+        study.replication_name,
     )
     options.note_departures(study.policies, study.scenarios)
     return results
@@ -227,6 +228,8 @@ def _ask_around(
     scenario = question.study.scenario
     if question.study.selection and (changes := question_around(results, scenario)):
         _run_question(changes, page, out, workers, dry_run=False, yes=True)
+        if question.study.years:  # limits are of a wind and of failures in single missions
+            return
         with console.compile_notice(), console.progress_bar("mission") as shown:
             find_limits(results, scenario, workers, shown.update)
 

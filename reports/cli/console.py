@@ -341,7 +341,10 @@ YesOption = Annotated[
 
 
 def run_or_exit(
-    name: str, run: "Callable[[Progress, Announce], Results]", again: str = "the same command again"
+    name: str,
+    run: "Callable[[Progress, Announce], Results]",
+    again: str = "the same command again",
+    replication: str = "mission",
 ) -> "Results":
     """Run a study; an interruption (exit code 130) or a failure (1) ends the command with a line.
 
@@ -349,6 +352,7 @@ def run_or_exit(
         name: The study.
         run: Runs it, with callbacks for missions done and for rounds.
         again: What completes it after an interruption.
+        replication: What its replications are.
 
     Raises:
         Interruption: If it was.
@@ -358,7 +362,7 @@ def run_or_exit(
     from dess.analysis.execution.workers import SchedulerError
 
     try:
-        with compile_notice(), _mission_bar() as (progress, announce):
+        with compile_notice(), _replication_bar(replication) as (progress, announce):
             return run(progress, announce)
     except KeyboardInterrupt:
         line = f"interrupted: run {again} to complete it"
@@ -375,9 +379,9 @@ def run_or_exit(
 
 
 @contextmanager
-def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
-    """Progress in missions: callbacks for missions done, and for rounds, which add missions."""
-    with progress_bar("mission") as shown:
+def _replication_bar(name: str) -> "Iterator[tuple[Progress, Announce]]":
+    """Progress in missions or years: callbacks for those done, and for rounds, which add some."""
+    with progress_bar(name) as shown:
 
         def begin(started: "Round") -> None:
             from dess.analysis.numbers import format_count  # which loads pandas
@@ -387,7 +391,7 @@ def _mission_bar() -> "Iterator[tuple[Progress, Announce]]":
             elif started.number:
                 shown.set_description(f"round {started.number + 1}", refresh=False)
             else:
-                line = format_count(started.missions, "mission")
+                line = format_count(started.missions, name)
                 if started.may_need_more:
                     line = f"at least {line}"
                 if started.present:

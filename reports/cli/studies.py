@@ -119,32 +119,34 @@ def _run_and_summarize(
         lambda progress, announce: run_study(
             study, out, workers, scheduler, progress, announce, accept
         ),
+        replication=study.replication_name,
     )
     print_summary(results, out, short=True)
     console.print_text(f"more: {command_line('study', 'show', out)}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
-    """Print the missions that a run would simulate, and the range of its time."""
+    """Print the missions or years that a run would simulate, and the range of its time."""
     from dess.analysis.execution.effort import total_time
     from dess.analysis.numbers import format_count
 
+    name = study.replication_name
     rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", str(p.seconds)] for p in plan]
-    console.print_table(["policy", "missions", "present", "time on one core"], rows)
+    console.print_table(["policy", f"{name}s", "present", "time on one core"], rows)
     per_cell = format_count(study.first, "replication")
     if study.rule:
         rule = "selection" if study.selection else "precision"
         most = len(study.policies) * study.most_missions
-        per_cell += f" and more, up to {most:,} missions, as {rule} asks"
+        per_cell += f" and more, up to {most:,} {name}s, as {rule} asks"
     missions = sum(p.missions for p in plan[: len(study.policies)])
     policies = format_count(len(study.policies), "policy")
     points = format_count(study.size, "design point")
     console.print_text(
-        f"{out}: {format_count(missions, 'mission')} of study {study.name} ({policies} "
+        f"{out}: {format_count(missions, name)} of study {study.name} ({policies} "
         f"x {points} x {per_cell})"
     )
     console.print_text(
-        f"{total_time(plan, workers)} with {workers} at work, by the usual speed of such missions; "
+        f"{total_time(plan, workers)} with {workers} at work, by their usual speed; "
         "compiling, on the first run, takes a few minutes more"
     )
 
@@ -228,7 +230,7 @@ def _show_comparison(
     """Show how every design point differs from one of them, with the same policy."""
     from dess.analysis import numbers
     from dess.analysis.answers.settings import baseline
-    from dess.analysis.metrics import METRICS, PRODUCT, measured_in
+    from dess.analysis.metrics import METRICS, measured_in, usual_metric
     from dess.reports.cli import tables as printed
 
     metrics = [*METRICS, *measured_in(results.missions)]
@@ -242,7 +244,7 @@ def _show_comparison(
         print(json.dumps(about | {"compared": rows}, indent=2))
         return
     console.print_text(f"against {baseline.baseline_in_words(results, point)}")
-    for metric in metrics if everything else [PRODUCT]:
+    for metric in metrics if everything else [usual_metric(results.missions)]:
         printed.print_table_with_caption(baseline.baseline_table(results, point, metric))
 
 

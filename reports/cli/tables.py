@@ -26,6 +26,7 @@ from dess.analysis.metrics import (
     measured_in,
     metric_group,
     metric_of,
+    usual_metric,
 )
 from dess.analysis.names import field_named
 from dess.analysis.paper import values
@@ -49,7 +50,7 @@ MANY_POINTS = 40  # more design points are not listed
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
     study = results.study
-    missions = numbers.format_count(len(results.missions), "mission")
+    missions = numbers.format_count(len(results.missions), study.replication_name)
     console.print_text(f"{folder}: {missions} of study {study.name}")
     if results.store.manifest.processes:
         console.print_text(f" with {results.store.manifest.functions}, in the SimPy engine")
@@ -78,12 +79,13 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         of_points = pd.DataFrame()
         if len(results.store.manifest.points) <= MANY_POINTS:
             of_points = summary.means_of_points(results)
-        _print_by_point(results, of_points, [PRODUCT])
+        _print_by_point(results, of_points, [ranking_metric(results)])
 
 
 def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
     """Print the means of a study that is not complete, with the missions of each."""
-    missions = numbers.format_count(len(results.missions), "mission")
+    name = results.study.replication_name
+    missions = numbers.format_count(len(results.missions), name)
     console.print_text(f"{folder}: {missions} of study {results.study.name}, which is incomplete")
     if results.study.selection:
         console.print_text(" intervals do not allow for the search, which has not ended")
@@ -97,7 +99,7 @@ def print_begun(results: Results, means: pd.DataFrame, folder: Path) -> None:
         ]
         rows.append([policy, points[int(point)], f"{of_setting['n'].max():,}", *estimates])
     heads = [metric_of(metric).head for metric in (SUCCESS, RATIO, PRODUCT)]
-    console.print_table(["policy", "setting", "missions", *heads], rows[:MANY_POINTS])
+    console.print_table(["policy", "setting", f"{name}s", *heads], rows[:MANY_POINTS])
     if (more := len(rows) - MANY_POINTS) > 0:
         console.print_text(f" {more:,} more rows; --csv and --json have them")
 
@@ -114,7 +116,7 @@ def print_details(
             the study selects by.
     """
     measured = measured_in({*frames["means"]["metric"]})
-    metrics = [*dict.fromkeys([ranking_metric(results), PRODUCT])]
+    metrics = [*dict.fromkeys([ranking_metric(results), usual_metric(results.missions)])]
     if everything:
         metrics = [*dict.fromkeys([*metrics, *METRICS, *measured])]
     printers = {
@@ -133,6 +135,8 @@ def print_details(
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
     }
+    if results.study.years:  # these are of single missions, or of the paper's metrics
+        printers = {name: printers[name] for name in ("costs", "means")}
     for name, print_rows in printers.items():
         if not frames[name].empty:
             print_rows(frames[name])

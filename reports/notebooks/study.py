@@ -59,6 +59,7 @@ from dess.analysis.answers.settings.sobol import (
     sobol_indices_of,
     variance_sentence,
 )
+from dess.analysis.answers.settings.years import year_table
 from dess.analysis.answers.worst_missions import worst_missions, worst_missions_table
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.ask.assumptions import assumption_facts
@@ -105,6 +106,9 @@ make_facts(answer.facts())
 # %% tags=["if-brief"]
 show_parts(page.draw_typical_mission(study))
 
+# %% tags=["if-years"]
+show_parts(page.draw_years(study, by))
+
 # %% tags=["if-missions"]
 page.make_panel_of(study, by)
 
@@ -123,16 +127,29 @@ show_parts(fleet_tables.fleet_table(study, by if metric else SUCCESS))
 # %% tags=["if-conditions"]
 show_parts(fleet_tables.condition_table(study))
 
-# %% [markdown] tags=["if-around"]
+# %% [markdown] tags=["if-around", "if-missions"]
 # ## What if
 #
 # One more UAV or pad, on the same missions.
+
+# %% [markdown] tags=["if-around", "if-years"]
+# ## What decides
+#
+# The night, each limit of the weather, the fleet and its speed: one change at a time, in the same
+# years, as in the figure above.
 
 # %% tags=["if-around"]
 from dess.analysis.ask import around
 from dess.analysis.ask.falls import draw_falls
 
+# %% tags=["if-around"]
 show_parts(around.table_around(study), draw_falls(study))
+
+# %% [markdown] tags=["if-years"]
+# ## Year by year
+
+# %% tags=["if-years"]
+show_parts(year_table(study, *page.shown_setting(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
@@ -164,9 +181,10 @@ show_parts(
 )
 
 # %% tags=["if-one-setting"]
+of_policies = metrics if study.study.years else METRICS
 show_parts(
-    (draw_performance(study, of) for of in METRICS),
-    tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, METRICS)),
+    (draw_performance(study, of) for of in of_policies),
+    tables.means_table(summary.means_of_points(study), metrics=with_way_home(study, of_policies)),
     write_markdown("{weights}", weights=summary.weights_in_words(study)),
 )
 
@@ -270,20 +288,20 @@ show_parts(
 # %% tags=["if-learned"]
 show_parts(comparisons.learner_table(study))
 
-# %% [markdown]
+# %% [markdown] tags=["if-missions"]
 # ## Single missions
 
-# %% tags=["if-answer"]
+# %% tags=["if-answer", "if-missions"]
 missions = missions_at_best(study, ranked)
 whose = f"every policy at its best setting by {called}"
 worst = worst_missions(study, best["policy"], point=best["point"])
 
-# %% tags=["if-cheapest"]
+# %% tags=["if-cheapest", "if-missions"]
 missions = search.shown_missions
 whose = "the fleet of the answer"
 worst = worst_missions(study, search.best.policy, point=search.shown_point)
 
-# %% tags=["if-ranked"]
+# %% tags=["if-ranked", "if-missions"]
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 show_parts(
     write_markdown("These figures show {whose}:", whose=whose),
@@ -291,7 +309,7 @@ show_parts(
     distributions.quantile_table(spread, by),
 )
 
-# %% tags=["if-sensitivity"]
+# %% tags=["if-sensitivity", "if-missions"]
 worst = worst_missions(study, ranks.best_policy(study.missions))
 
 # %% tags=["if-missions"]

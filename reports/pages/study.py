@@ -23,6 +23,7 @@ from dess.analysis.answers.settings.points import (
     varied_values,
 )
 from dess.analysis.answers.settings.ranking import rank_settings, ranking_metric
+from dess.analysis.answers.settings.years import draw_calendar, setting_with_oldest_data
 from dess.analysis.ask import around
 from dess.analysis.figures import Drawing
 from dess.analysis.figures.missions import map_figure
@@ -51,7 +52,7 @@ _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
 def list_simulated(results: Results) -> Marked:
-    """What was simulated: scenario, policies, design and missions, as a list."""
+    """What was simulated: scenario, policies, design and missions or years, as a list."""
     manifest = results.store.manifest
     study = manifest.study
     points = len(manifest.points)
@@ -75,7 +76,7 @@ def list_simulated(results: Results) -> Marked:
         ),
         f"- **Policies:** {policies}.",
         *_describe_design(results),
-        f"- **Missions:** {missions}{unit}, {len(results.missions):,} in all.",
+        f"- **{results.replications_head}:** {missions}{unit}, {len(results.missions):,} in all.",
         list_notes(results),
     ]
     return Marked("\n".join(filter(None, lines)))
@@ -142,7 +143,7 @@ def shown_metrics(results: Results, by: str) -> list[str]:
     asked = [requirement.column for requirement in requirements_of(results)]
     if asked:
         return [*dict.fromkeys([by, *asked])]
-    return metrics_of_page(by)
+    return metrics_of_page(results, by)
 
 
 def list_guarantees(results: Results) -> Marked:
@@ -241,12 +242,11 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
     manifest = results.store.manifest
     if manifest.processes:
         return Markdown(f"A page cannot simulate {manifest.functions}, which is Python.")
-    point, policy = 0, results.policies[0]
+    policy, point = shown_setting(results, metric)
     shown_search = None
     rule = results.study.selection
     if isinstance(rule, Cheapest):
         search = search_of(results)
-        point, policy = search.shown_point, search.best.policy
         fleet = ""
         if search.best.points:
             fleet = search.best.fleet
@@ -256,9 +256,6 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
             tolerance=rule.tolerance,
             indifference=rule.indifference,
         )
-    elif results.design != "saltelli":
-        best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
-        point, policy = int(best.point), best.policy
     space = results.scenario(point)
     name = manifest.points[point].values.get(SEA, results.study.scenario)
     return make_panel(
@@ -273,6 +270,37 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         given=results.given_values(point),
         search=shown_search,
     )
+
+
+def shown_setting(results: Results, metric: str | None = None) -> tuple[str, int]:
+    """The policy and the design point that the page shows more of: those of the answer.
+
+    Args:
+        results: The study.
+        metric: The metric that ranks the settings, if it is not that of the study.
+    """
+    if isinstance(results.study.selection, Cheapest):
+        search = search_of(results)
+        if results.study.years and search.best.points:
+            points = search.best.points
+            return search.best.policy, setting_with_oldest_data(results, search.best.policy, points)
+        return search.best.policy, search.shown_point
+    if results.design == "saltelli":
+        return results.policies[0], 0
+    best = rank_settings(results, ranking_metric(results, metric)).iloc[0]
+    return str(best.policy), int(best.point)
+
+
+def draw_years(results: Results, metric: str | None = None) -> Iterator[Drawing]:
+    """The calendar of the years of the answer, and what decides the age of its data if known.
+
+    Args:
+        results: A study of years.
+        metric: As for ``shown_setting``.
+    """
+    yield draw_calendar(results, *shown_setting(results, metric))
+    if isinstance(results.study.selection, Cheapest) and around.is_known(results):
+        yield around.draw_ages(results)
 
 
 def draw_typical_mission(results: Results) -> list[Drawing]:
@@ -337,9 +365,10 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         # Design points spread over the space of parameters.
         "if-sampled": kind == "latin-hypercube" or (kind == "table" and fields > 2),
         "if-sensitivity": not is_ranked,
-        # Several policies with the same missions; some of them learned, some not.
-        "if-policies": comparisons.has_policies_to_compare(results),
-        "if-learned": comparisons.has_learned_to_compare(results),
+        # Several policies with the same missions, not years, which are compared by the paper's
+        # metrics; some of them learned, some not.
+        "if-policies": has_missions and comparisons.has_policies_to_compare(results),
+        "if-learned": has_missions and comparisons.has_learned_to_compare(results),
         # Tables of the study.
         "if-selection": isinstance(study.selection, Selection),
         "if-cheapest": is_search,
@@ -352,5 +381,6 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
         "if-brief": has_missions and is_search and all(space.units for space in manifest.scenarios),
         # Replications are missions, which can be looked at one by one.
         "if-missions": has_missions,
+        "if-years": not has_missions,
         "if-around": is_search and around.is_known(results),
     }

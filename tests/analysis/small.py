@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from dess.analysis import load_study
@@ -13,6 +14,7 @@ from dess.analysis.ask.answer import VariationAnswer
 from dess.analysis.ask.question import what_if_question
 from dess.analysis.facts import Fact
 from dess.analysis.study.study import Study
+from dess.scenario.weather import REPLACED
 
 SCENARIO: dict[str, Any] = {
     "grid": 8,
@@ -46,6 +48,34 @@ def write_scenario(folder: Path, **changes: Any) -> Path:
     path = folder / "small.toml"
     path.write_text(tomli_w.dumps(SCENARIO | changes), "utf-8")
     return path
+
+
+# Two years of weather for the small scenario: it is calm for four hours a day, in two of which UAVs
+# operate; never in January, and waves are high on the first ten days of July.
+STORM, CALM = 30, 5  # [m/s]
+HIGH, LOW = 3.0, 0.5  # [m]
+
+
+def write_years(folder: Path, **weather: Any) -> Path:
+    """The small scenario with a data sheet, one UAV, and two years of weather, as a TOML file."""
+    hours = np.arange("2019-01-01T00", "2021-01-01T00", dtype="datetime64[h]")
+    months = hours.astype("datetime64[M]")
+    of_day = (hours - hours.astype("datetime64[D]")).astype(int)
+    is_calm = (months.astype(int) % 12 != 0) & (of_day >= 8) & (of_day < 12)
+    days = (hours.astype("datetime64[D]") - months).astype(int)
+    is_high = (months.astype(int) % 12 == 6) & (days < 10)
+    rows = zip(hours, np.where(is_calm, CALM, STORM), np.where(is_high, HIGH, LOW), strict=True)
+    lines = [f"{hour}:00,{wind},45,{waves}" for hour, wind, waves in rows]
+    (folder / "weather.csv").write_text("\n".join(["time,wind,from,waves", *lines]), "utf-8")
+    section = {
+        **{"file": "weather.csv", "operating": "08:00-10:00", "longitude": 0},
+        **{"limits": {"waves": "1.5 m"}, "longest": "2 h"},
+    }
+    sheet = {key: value for key, value in SHEET["data_sheet"].items() if key not in REPLACED}
+    return write_scenario(
+        folder,
+        **{**SHEET, "data_sheet": sheet, "uavs": 1, "weather": section | weather},
+    )
 
 
 def small_study(folder: Path, **changes: Any) -> Study:

@@ -44,8 +44,17 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
 )
 from dess.analysis.answers.settings.ranking import unequal_lengths
+from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
-from dess.analysis.metrics import COST, HOME, SUCCESS, Metric, metric_of
+from dess.analysis.metrics import (
+    AGE,
+    COST,
+    HOME,
+    SUCCESS,
+    Metric,
+    column_in_sheet_unit,
+    metric_of,
+)
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.requirement import Requirement
@@ -184,6 +193,7 @@ class CheapestFleet:
                 *self._requirement_facts(policies),
                 *self._home_facts(),
                 self._missions_fact(),
+                *self._year_facts(),
                 *self._cost_facts(),
                 self._cheaper_fact(),
                 Fact(
@@ -228,14 +238,25 @@ class CheapestFleet:
             yield Fact("UAVs without it, which have no price", f"{number} of a mission")
 
     def _missions_fact(self) -> Fact:
-        """On which missions the fleet was measured."""
-        missions = numbers.format_count(int(self.estimates(SUCCESS)["n"]), "mission")
+        """On which missions or years the fleet was measured."""
+        name = self.results.study.replication_name
+        missions = numbers.format_count(int(self.estimates(SUCCESS)["n"]), name)
         source = "of the search"
         if not self.results.checks.empty:
             source = "that check it"
         if len(self.points) > 1:
             source += ", under the worst condition for each metric"
         return Fact("measured in", f"{missions} {source}")
+
+    def _year_facts(self) -> list[Fact]:
+        """What years tell of the fleet, and its age where no requirement does."""
+        if not self.results.study.years:
+            return []
+        age = column_in_sheet_unit(AGE, self.results.missions)
+        facts = year_facts(self.results, self.policy, self.points)
+        if age not in [requirement.column for requirement in self._required]:
+            facts.insert(0, Fact(metric_of(age).within, self.measured(age)))
+        return facts
 
     def _cost_facts(self) -> Iterator[Fact]:
         """The cost of the fleet with its interval, and its parts."""
@@ -252,13 +273,14 @@ class CheapestFleet:
         return Fact("a cheaper one may lie beyond", ends)
 
     def _undecided_fact(self) -> Fact:
-        """Which fleet the budget left undecided, and about how many missions would settle it."""
+        """Which fleet is undecided, and about how many missions or years would settle it."""
         choice = self._choice
         if not choice.done or self._answer.settled:
             return Fact("undecided", "")
-        enough = "far more missions"
+        name = self.results.study.replication_name
+        enough = f"far more {name}s"
         if choice.enough:
-            enough = f"about {float(f'{choice.enough:.2g}'):,.0f} missions"
+            enough = f"about {float(f'{choice.enough:.2g}'):,.0f} {name}s"
         return Fact("undecided", f"{self._undecided_in_words()}; {enough} would settle it")
 
     def _undecided_in_words(self) -> str:
@@ -367,14 +389,17 @@ class FleetSearch:
     # --- facts ---
 
     def headline(self) -> str:
-        """What to buy, and what it costs."""
+        """What to buy, and what it costs; of years also how old the data are."""
         if not self.best.points:
             return "No fleet is known to meet the requirements."
         prices = self.results.prices
         missions = ""
         if prices.pays_for_missions and prices.years is None:
             missions = f" with {numbers.format_count(prices.paid_missions, 'mission')}"
-        return f"Buy {self.best.fleet}: {self.best.cost_in_words}{missions}."
+        bought = f"Buy {self.best.fleet}: {self.best.cost_in_words}{missions}."
+        if not self.results.study.years:
+            return bought
+        return f"{bought} {age_sentence(self.results, self.best.policy, self.best.points)}"
 
     def facts(self) -> list[Fact]:
         """The answer by every requirement, and the answers of other policies and conditions."""

@@ -81,7 +81,9 @@ def price_facts(results: Results) -> list[Fact]:
     missions = numbers.format_count(prices.paid_missions, "mission")
     planned = ""
     if prices.years is not None:
-        planned = f"{prices.annuity_in_words}; {missions} a year"
+        planned = prices.annuity_in_words
+        if not results.study.years:
+            planned += f"; {missions} a year"
         if prices.pack:
             planned += f"; a pack is worn after {prices.pack_cycles:g} full charges"
     elif prices.pays_for_missions:
@@ -221,10 +223,12 @@ def cost_facts(results: Results, policy: str, fleet: Sequence[int]) -> list[Fact
             for part, name in _PART_NAMES.items()
             if part in prices.paid_parts
         ]
-        missions = numbers.format_count(prices.paid_missions, "mission")
+        simulated = "the flights of a year"
+        if not results.study.years:
+            simulated = numbers.format_count(prices.paid_missions, "mission")
         total = money(means.sum() - means[PURCHASE])
         facts.append(Fact("of it for the purchase", money(means[PURCHASE])))
-        facts.append(Fact(f"of it for {missions}", f"{total}: {', '.join(running)}"))
+        facts.append(Fact(f"of it for {simulated}", f"{total}: {', '.join(running)}"))
     facts.append(_cost_per_gb(results, rows))
     if prices.years is not None:
         price = prices.price_of_fleet(results.scenario(fleet[0]))

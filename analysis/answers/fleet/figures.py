@@ -16,7 +16,7 @@ from dess.analysis.answers.fleet.requirements import (
     requirements_of,
 )
 from dess.analysis.answers.fleet.verdicts import interval_columns
-from dess.analysis.answers.settings.figures import counted_missions
+from dess.analysis.answers.settings.figures import counted_replications
 from dess.analysis.figures import Drawing, style
 from dess.analysis.figures.style import plot_front
 from dess.analysis.metrics import COST, Metric
@@ -146,5 +146,5 @@ def _draw_costs(results: Results, rows: pd.DataFrame, metric: str, marks: str) -
     alt = f"Cost against {measure.within}"
     if condition:
         alt += f", {condition}"
-    counted = f"{INTERVALS}; n = {counted_missions(rows)} missions per setting."
+    counted = f"{INTERVALS}; n = {counted_replications(results, rows)} per setting."
     return Drawing(drawing, alt, f"{alt}. {marks} Bars are {counted}", rows)

@@ -77,14 +77,16 @@ def fleet_cells(results: Results, rows: pd.DataFrame, further: str = SUCCESS) ->
     place = cells.shape[1]
     if results.prices.pays_for_missions:
         cells.insert(place, "Purchase", rows["purchase"].map(format_amount))
-        cells.insert(place + 1, "Missions' cost", rows["running"].map(format_amount))
+        running = "Flights' cost" if results.study.years else "Missions' cost"
+        cells.insert(place + 1, running, rows["running"].map(format_amount))
     is_answer = rows["answer"] == "answer"
     cells["Requirements"] = rows["verdict"].where(~is_answer, rows["verdict"] + ": the answer")
     further_metric = metric_asked_for(results, further)
     for metric in dict.fromkeys([*reported_metrics(results), further_metric]):
         if metric.column != COST:
             cells[metric.name] = numbers.format_estimates(rows, metric.column, metric.written)
-    return cells.assign(n=format_counts(rows["n"]))
+    head = results.replications_head if results.study.years else "n"
+    return cells.assign(**{head: format_counts(rows["n"])})
 
 
 def fleet_table(results: Results, further: str = SUCCESS) -> Table:

@@ -218,6 +218,7 @@ def draw_performance(results: Results, metric: str) -> Drawing:
     table = means_of_points(results)
     data = table[table["metric"] == metric]
     caption = name_best_mean(data, metric, ["policy"])
-    caption += f"n = {numbers.format_span(data['n'])} missions per policy; bars are {INTERVALS}."
+    name = results.study.replication_name
+    caption += f"n = {numbers.format_span(data['n'])} {name}s per policy; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} of every policy"
     return Drawing(plot_performance(table, metric), alt, caption, data)

@@ -4,9 +4,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from dess.analysis.metrics import (
-    PRODUCT,
-)
+from dess.analysis.metrics import metric_of, usual_metric
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.weights import values_within
@@ -14,7 +12,7 @@ from dess.policies.shipped import HEURISTICS
 
 
 def rank_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
-    """The policies by their mean product, the best one first.
+    """The policies by their mean product, or in years age, the best one first.
 
     Every design point has the same weight. Of policies with equal means, the one that appears first
     is ranked first.
@@ -28,15 +26,16 @@ def rank_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) ->
     else:
         among = [*among]
     cell = ["policy", "point"]
-    values = missions[cell].assign(value=values_within(missions, PRODUCT, cell))
+    metric = usual_metric(missions)
+    values = missions[cell].assign(value=values_within(missions, metric, cell))
     at_points = values.groupby(cell, sort=False)["value"].mean()
     means = at_points.groupby("policy", sort=False).mean()
-    ranked = means.sort_values(ascending=False, kind="stable").index
+    ranked = means.sort_values(ascending=metric_of(metric).less_is_better, kind="stable").index
     return [str(policy) for policy in ranked if policy in among]
 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
-    """The policy with the highest mean product."""
+    """The policy with the highest mean product, or in years with the youngest data."""
     return rank_policies(missions, among)[0]
 
 

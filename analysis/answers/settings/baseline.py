@@ -102,7 +102,7 @@ def compare_with_baseline(
 
 def baseline_table(results: Results, point: int, metric: str) -> Table:
     """Every design point compared with a baseline point."""
-    data = compare_with_baseline(results, point, metrics_of_page(metric))
+    data = compare_with_baseline(results, point, metrics_of_page(results, metric))
     measure = metric_of(metric)
     rows = data[data["metric"] == metric]
     order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index

@@ -80,7 +80,7 @@ def draw_curves(
     drawing = plot_curves(data, x, hue or "policy", metric, "policy" if hue else None)
     mark = "dot" if hue else "point"
     caption = name_best_mean(data, metric, ["policy", x, *filter(None, [hue])])
-    caption += f"n = {counted_missions(data)} missions per {mark}; bars are {INTERVALS}."
+    caption += f"n = {counted_replications(results, data)} per {mark}; bars are {INTERVALS}."
     alt = f"{metric_of(metric).name} against the {field_named(x).within}"
     return Drawing(drawing, alt, caption, data.drop(columns="selected"))
 
@@ -196,9 +196,11 @@ def draw_heat_map(
         title = f"{measure.label}: {policy}"
         figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
     unit = "in percent, " if measure.in_percent else ""
-    counted = "replications" if facet else "missions"
+    counted = counted_replications(results, data)
+    if facet:
+        counted = f"{numbers.format_span(data['n'])} replications"
     caption = name_best_mean(data, metric, named)
-    caption += f"Means of {policy}, {unit}n = {counted_missions(data)} {counted} per cell. "
+    caption += f"Means of {policy}, {unit}n = {counted} per cell. "
     if facet:
         caption += f"One panel for each value of the {field_named(facet).within}"
         caption += f"{_left_out_in_words(values[facet], panels)}. "
@@ -265,7 +267,7 @@ def draw_main_effects(
     drawing = _panel_per_field(fields_by_influence(effects), measure, draw)
     caption = (
         "One panel for each field, the one with the largest effect first. A dot is the mean over "
-        f"{_MEANT[results.design == 'saltelli']}; n = {counted_missions(effects)}; "
+        f"{_MEANT[results.design == 'saltelli']}; n = {numbers.format_span(effects['n'])}; "
         f"bars are {INTERVALS}."
     )
     alt = f"{measure.name} against each field, averaged over the others"
@@ -297,7 +299,7 @@ def draw_scatter(results: Results, metric: str = PRODUCT, policy: str | None = N
 
     caption = (
         f"One panel for each field. A dot is the mean of a policy at a design point, over "
-        f"n = {counted_missions(table)} missions. All fields vary at once, so dots above each "
+        f"n = {counted_replications(results, table)}. All fields vary at once, so dots above each "
         "other differ in the other fields."
     )
     drawing = _panel_per_field([*varied_values(results)], measure, draw)
@@ -368,9 +370,9 @@ def _format_cell(value: float, metric: Metric) -> str:
     return f"{value:.3g}"
 
 
-def counted_missions(table: pd.DataFrame) -> str:
-    """The smallest and the largest number of missions of the rows of a table."""
-    return numbers.format_span(table["n"])
+def counted_replications(results: Results, table: pd.DataFrame) -> str:
+    """How many missions, or years, the rows of a table have: ``20 to 1,200 missions``."""
+    return f"{numbers.format_span(table['n'])} {results.study.replication_name}s"
 
 
 def _fields_in_words(fields: Sequence[str]) -> str:
@@ -428,8 +430,8 @@ def draw_one_at_a_time(results: Results) -> Iterator[Drawing]:
     for field, pairs in compare_values_by_field(results, table).items():
         data = table[table["field"] == field]
         caption = (
-            f"n = {counted_missions(data)} missions per point; bars are {INTERVALS}. The lowest "
-            "panel shows the paired difference from the first value, with an axis of its own: "
+            f"n = {counted_replications(results, data)} per point; bars are {INTERVALS}. The "
+            "lowest panel shows the paired difference from the first value, on an axis of its own: "
             f"{BARS}"
         )
         alt = f"The metrics against the {field_named(field).within}"

@@ -13,7 +13,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from dess.analysis import numbers
-from dess.analysis.metrics import METRICS
+from dess.analysis.metrics import LATE, METRICS, SUCCESS
 from dess.analysis.names import DECISIONS, field_named, single_value
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.study.prices import has_priced_types
@@ -203,8 +203,13 @@ def intervals_in_words(results: Results) -> str:
     return INTERVALS
 
 
-def metrics_of_page(metric: str) -> list[str]:
-    """The metrics on the page of a study: the one that ranks the settings, and the paper's."""
+def metrics_of_page(results: Results, metric: str) -> list[str]:
+    """The metrics on the page of a study: the one that ranks the settings, and the paper's.
+
+    Of years they are the success and the late data: the others of the paper tend to 1.
+    """
+    if results.study.years:
+        return [*dict.fromkeys((metric, SUCCESS, LATE))]
     return [*dict.fromkeys((metric, *METRICS))]
 
 

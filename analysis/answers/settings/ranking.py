@@ -27,6 +27,7 @@ from dess.analysis.answers.settings.points import (
     values_of_points,
     varied_values,
 )
+from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
 from dess.analysis.metrics import (
     COST,
@@ -40,6 +41,7 @@ from dess.analysis.metrics import (
     metric_of,
     metrics_in,
     ranking_column,
+    usual_metric,
 )
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
@@ -65,13 +67,13 @@ MOST_NAMES = 3  # the largest number of settings that are named because they may
 
 
 def ranking_metric(results: Results, metric: str | None = None) -> str:
-    """The metric that ranks the settings: the given one, the one of the selection, or the product.
+    """The metric that ranks the settings: the given one, that of the selection, or the usual one.
 
     Raises:
         InputError: If there is no such metric.
     """
     if metric is None:
-        metric = getattr(results.study.selection, "metric", PRODUCT)
+        metric = getattr(results.study.selection, "metric", usual_metric(results.missions))
     return ranking_column(metric, results.missions)
 
 
@@ -86,7 +88,10 @@ def best_setting_headline(results: Results, table: pd.DataFrame, metric: str) ->
     best = table.iloc[0]
     measure = metric_of(metric)
     name = setting_in_words(results, best["policy"], best["point"])
-    return f"The best is {name}: {measure.within} {measure.write(best[metric])}."
+    found = f"The best is {name}: {measure.within} {measure.write(best[metric])}."
+    if not results.study.years:
+        return found
+    return f"{found} {age_sentence(results, best['policy'], [best['point']])}"
 
 
 def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> list[Fact]:
@@ -105,7 +110,10 @@ def best_setting_facts(results: Results, table: pd.DataFrame, metric: str) -> li
     if metric in (SUCCESS, PRODUCT) and may_end_in_the_air(results):
         columns.append(metric_of(HOME))
     facts = [Fact(each.within, _estimate(best, each)) for each in columns]
-    facts.append(Fact("measured in", numbers.format_count(best["n"], "mission")))
+    name = results.study.replication_name
+    facts.append(Fact("measured in", numbers.format_count(best["n"], name)))
+    if results.study.years:
+        facts += year_facts(results, policy, [point])
     facts.append(Fact("hardly served", hardly_served_nodes(results, policy, [point])))
     facts += _comparison_facts(results, table.iloc[1:])
     ends = ends_in_words(results, point, ends_of_point(results, point))
@@ -326,6 +334,6 @@ def best_of_policies_table(results: Results, metric: str) -> Table:
 def _ranking_cells(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Rows of ``rank_settings`` as text."""
     cells = named_cells(results, rows)
-    for measure in map(metric_of, with_way_home(results, metrics_of_page(metric))):
+    for measure in map(metric_of, with_way_home(results, metrics_of_page(results, metric))):
         cells[measure.name] = numbers.format_estimates(rows, measure.column, measure.written)
-    return cells.assign(Missions=format_counts(rows["n"]))
+    return cells.assign(**{results.replications_head: format_counts(rows["n"])})

@@ -140,10 +140,10 @@ class Weather(Section):
         self.bounds()
         for name, unit in self.units.items():
             try:
-                known = unit_of_column(known_name(name), unit)
+                column_unit = unit_of_column(known_name(name), unit)
             except InputError as error:
                 raise error.within("units") from None
-            if known is None:
+            if column_unit is None:
                 raise InputError(f"units.{name}", f"{shown(unit)} is unknown", "such as km/h")
         if self.is_on and not self.file:
             raise InputError("file", "is missing", "the name of a file of hourly weather")

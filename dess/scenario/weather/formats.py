@@ -137,7 +137,7 @@ def _rows_of_others(times: Any, columns: Mapping[str, Any]) -> Rows:
 def known_name(name: str) -> str:
     """What a column is called here: its known name, or else its own."""
     lower = name.lower()
-    return next((known for known, names in COLUMNS.items() if lower in names), name)
+    return next((column for column, names in COLUMNS.items() if lower in names), name)
 
 
 def unit_of_column(name: str, unit: str) -> tuple[str, Fraction] | None:
@@ -235,13 +235,13 @@ def _rows_of_table(
     for name, (column, unit) in named.items():
         try:
             values = _numbers_of(table[column], f"{path}: {column}", times)
-            known = unit_of_column(name, unit) if unit else None
+            column_unit = unit_of_column(name, unit) if unit else None
         except InputError as error:
             if name in UNITS:
                 raise error if str(path) in error.where else error.within(path) from None
             continue  # a column of texts, which no limit can have
-        if known:
-            size = known[1]
+        if column_unit:
+            size = column_unit[1]
             values = values * size.numerator / size.denominator
         columns[name] = values
     for name in _PLACE:

@@ -258,7 +258,7 @@ def with_missions(answer, before, after, ratios):
 def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(answer):
     before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
     made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
-    differences = found.product_differences(made.results, "greedy").tolist()
+    differences = found.paired_differences(made.results, "greedy").tolist()
     assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
     assert (made.variation.typical().replication, made.variation.worst().replication) == (1, 4)
     even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
@@ -273,7 +273,7 @@ def test_what_contradicts_the_mean_is_told_by_pairs_and_failures(answer):
     missions = missions.assign(success=(missions[PRODUCT] > 0).astype(float))
     variation = replace(made, results=replace(made.results, missions=missions)).variation
     row = row_of(0.5, -0.1, -0.3, 0.1)
-    said = found_of(variation._product_facts(row))
+    said = found_of(variation._leading_facts(row))
     assert said["100 pairs with greedy"] == "better in 75.0 %, worse in 25.0 %"
     assert said["failed missions with greedy"] == "0 before, 1 after"
 
@@ -308,7 +308,7 @@ def test_the_best_policy_of_each_side_is_found(answer):
     ],
 )
 def test_a_difference_is_told_with_its_verdict_or_how_many_missions_it_takes(answer, ends, said):
-    facts = found_of(answer.variation._product_facts(row_of(0.9, *ends)))
+    facts = found_of(answer.variation._leading_facts(row_of(0.9, *ends)))
     assert facts["product with greedy"] == said
     needed = facts.get("missions to show it with greedy")
     assert needed == (None if ends[1] * ends[2] > 0 else "about 820 for a probability of 80 %")
@@ -334,7 +334,7 @@ def test_captions_say_what_the_figures_show(answer):
                 assert f"({found.format_change(row)}" in sentence
     for policy in answer.results.policies:
         share = numbers.format_percent(
-            (found.product_differences(answer.results, policy) > 0).mean()
+            (found.paired_differences(answer.results, policy) > 0).mean()
         )
         assert f"higher in {share} and lower in" in variation.spread_in_words()
     never = answer.table().query("low == high == 0").iloc[0]
