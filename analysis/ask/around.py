@@ -286,13 +286,13 @@ def draw_ages(results: Results) -> Drawing:
         ax.set(xlabel=metric.label, ylim=(len(table) - 0.4, -0.6))
         style.set_axis_unit(ax.xaxis, "", 5)
     years = numbers.format_count(load_around(results).study.years or 0, "year")
-    caption = (
-        f"The mean age of the data on the same {years}: the fleet, and what one change at a time "
-        f"makes of it. Blue is younger, orange older; bars are {INTERVALS} of the difference"
-    )
     asked = results.study.years or 0
     if asked > YEARS:
-        caption += f". They are the first {years} of the {asked} of the search"
+        years += f", the first of the {asked} of the search"
+    caption = (
+        f"The mean age of the data on the same {years}: the fleet, and one change at a time. Blue "
+        f"is younger, orange older; bars are {INTERVALS} of the difference"
+    )
     alt = "Age of information with each of several changes"
     return Drawing(figure, alt, f"{caption}.", table)
 

@@ -15,6 +15,8 @@ from dess.scenario.quantities import printed
 from dess.scenario.scenario import ScenarioSpace
 from dess.scenario.weather import ALWAYS, DAYLIGHT
 
+_LISTED = "what the file of the nodes says"
+
 
 def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     """What a success, a slot and a cell are, who flies, and the data, radio, wind and failures.
@@ -34,7 +36,6 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     quota = ""
     if space.quota != 0:
         quota = " with its quota filled"
-    listed = "what the file of the nodes says"
 
     def given(field: str, otherwise: str) -> str:
         """A field of the sheet in words."""
@@ -60,17 +61,17 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     flight = "window" if space.weather.is_on else "mission"
     facts = {
         "success": f"at the end of a {flight} every UAV has landed{quota}",
-        "slot": f"{_slot_of(space, varied)}; once a slot every UAV moves by a cell, hovers or "
+        "slot": f"{slot_in_words(space, varied)}; once a slot every UAV moves by a cell, hovers or "
         "charges",
-        "cell": _cell_of(space, varied),
+        "cell": cell_in_words(space, varied),
         "sea": f"{wide} x {high}",
         "policy": f"{_policy_of(results, metric)}, which knows the data left at every node",
         "altitude": f"{value_text(space.altitude)} m",
         "charging": f"from empty to full in {given('charging', '')}",
         "reserve": given("reserve", "none"),
-        "data": f"{given('data_rate', listed)} at each of {nodes} in messages of "
+        "data": f"{given('data_rate', _LISTED)} at each of {nodes} in messages of "
         f"{given('message', sheet.assumed.get('message', ''))}",
-        "data at the start": _data_at_the_start(space, varied, given("backlog", ""), listed),
+        "data at the start": data_at_the_start(space, varied),
         "radio": f"SNR {given('snr', 'of a link budget')}, path loss exponent "
         f"{value_text(space.path_loss_exponent)}, range {given('range', 'without end')}; "
         f"{given('bandwidth', '')}, {_rates_of(space, varied)}{duty}",
@@ -80,6 +81,7 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
         "failures": failures if sheet.mtbf or "mtbf" in varied else "none",
     }
     if space.weather.is_on:
+        del facts["battery"]  # the window says it
         facts["means"] = "over years, with 95 % intervals"
     else:
         facts["mission"] = given("horizon", printed(space.max_slots * units.slot, "s"))
@@ -87,7 +89,7 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     return [Fact(label, found) for label, found in facts.items()]
 
 
-def _slot_of(space: ScenarioSpace, varied: set[str]) -> str:
+def slot_in_words(space: ScenarioSpace, varied: set[str]) -> str:
     """How long a slot is, and what it follows from."""
     sheet, units = space.data_sheet, space.units
     assert units
@@ -99,7 +101,7 @@ def _slot_of(space: ScenarioSpace, varied: set[str]) -> str:
     return f"{printed(units.slot, 's')}, a hundredth of the endurance of {endurance}"
 
 
-def _cell_of(space: ScenarioSpace, varied: set[str]) -> str:
+def cell_in_words(space: ScenarioSpace, varied: set[str]) -> str:
     """How wide a cell is, and what it follows from."""
     sheet, units = space.data_sheet, space.units
     assert units
@@ -110,19 +112,22 @@ def _cell_of(space: ScenarioSpace, varied: set[str]) -> str:
     return f"{printed(units.cell, 'm')} wide, the way of a slot at {sheet.cruise}"
 
 
-def _data_at_the_start(space: ScenarioSpace, varied: set[str], backlog: str, listed: str) -> str:
+def data_at_the_start(space: ScenarioSpace, varied: set[str]) -> str:
     """Which data nodes have when a mission begins, and how old they are.
 
     Args:
         space: A scenario.
         varied: The fields of the sheet that its design varies.
-        backlog: The backlog in words; empty if there is none.
-        listed: What the file of the nodes has, in words.
     """
     sheet, units = space.data_sheet, space.units
     assert units
-    if not backlog and space.arrivals.initial:
-        backlog = listed
+    backlog = ""
+    if "backlog" in varied:
+        backlog = "as asked"
+    elif isinstance(sheet.backlog, str):
+        backlog = sheet.backlog
+    elif space.arrivals.initial:
+        backlog = _LISTED
     if space.weather.is_on:
         first = backlog or "none, of age 0"
         return f"{first} at the beginning of a year; a window has those left before it, and newer"
@@ -131,8 +136,8 @@ def _data_at_the_start(space: ScenarioSpace, varied: set[str], backlog: str, lis
     if sheet.idle:
         more = f"{backlog}, and " if backlog else ""
         return f"{more}those of {sheet.idle} without a mission, which is their age"
-    hours = 24 - space.max_slots * units.slot / 3600
     told = f"{backlog or 'none'}, of age 0, as if UAVs had just emptied all nodes"
+    hours = 24 - space.max_slots * units.slot / 3600
     if hours < 1:
         return told
     return (
@@ -148,13 +153,13 @@ def _weather_of(space: ScenarioSpace, wind: str) -> dict[str, str]:
         return {"wind": f"{wind}, the same everywhere and always"}
     limits = [f"{name} {value}" for name, value in weather.limits.items()]
     speed = space.data_sheet.max_speed
-    operating = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
+    known = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
+    operating = known.get(weather.operating) or f"{weather.operating}, solar time"
     return {
         "weather": f"hour by hour, {weather.path.name}; the same everywhere in the sea",
         "wind": f"of the hour, from {weather.height} to the altitude by a power law (0.11); UAVs "
         f"fly if {speed} through the air are enough for all moves",
-        "limits": ", ".join(limits) or "none but the wind",
-        "operating": operating.get(weather.operating) or f"{weather.operating}, solar time",
+        "operating": f"{operating}; limits: {', '.join(limits) or 'none but the wind'}",
         "window": f"open hours in a row, at most {weather.longest}, whose weather policy and "
         "return guard know beforehand; each move takes the most that it takes in one of its hours",
         "lost UAVs": _replaced(space),
@@ -172,8 +177,6 @@ def _replaced(space: ScenarioSpace) -> str:
 
 def _battery_of(space: ScenarioSpace, varied: set[str]) -> str:
     """What a slot takes of the battery."""
-    if space.weather.is_on:
-        return "what a slot takes follows from the winds of the window"
     if varied & {"wind", "cruise", "endurance", "hover", "tip_speed", "induced_speed"}:
         return "what a slot takes follows from the speed through the air"
     return battery_sentence(space)

@@ -385,7 +385,13 @@ class Cheapest(StrictTable):
         )
 
     def of_years(self, years: int, points: int) -> Self:
-        """The rule where every one of so many points has all of so many years at once."""
+        """The rule where every one of so many points has all of so many years at once.
+
+        Raises:
+            InputError: If the years are too few.
+        """
+        if years < 2:
+            raise InputError("years", f"{years} is too few", "2 or more, for a selection")
         return self.model_copy(update={"first": years, "budget": years * points, "check": 0})
 
     def shown(self, policies: int = 1) -> float:
@@ -427,7 +433,8 @@ class Cheapest(StrictTable):
             f"{low}. No setting that is said to miss them has {high}. The selected setting costs "
             f"at most {saving} more than any that has {high}. The statement on costs takes "
             "the differences of costs as nearly normal, apart from the losses of UAVs; where a "
-            "rare mission is much more expensive than the others, it holds less often"
+            f"rare {'year' if is_of_years else 'mission'} is much more expensive than the others, "
+            "it holds less often"
         )
         if all(question.answer.settled for question in search.questions):
             return words

@@ -314,8 +314,6 @@ class Study(StudyData):
             raise InputError(name, "are of single missions", "without them, with weather")
         years = self.years or YEARS
         object.__setattr__(self, "years", years)
-        if self.selection and years < 2:
-            raise InputError("years", f"{years} is too few", "2 or more, for a selection")
         if isinstance(self.selection, Selection):
             raise InputError("selection", "needs missions", "procedure = cheapest, with weather")
         if self.selection:

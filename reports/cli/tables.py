@@ -59,7 +59,7 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     printed = values.PRINTED.get(study.name, {})
     if study.selection:
         selected = decided.selected_settings(results)
-        _print_selections(selected)
+        _print_selections(selected, study.replication_name)
         is_search = "condition" in selected
         if is_search and study.costs:
             answer = settings_answer(results)
@@ -185,13 +185,14 @@ def _print_titled(title: str, cells: pd.DataFrame) -> None:
     print_cells(cells)
 
 
-def _print_selections(selected: pd.DataFrame) -> None:
-    """The selected point of every policy, and the guarantee of the procedure."""
+def _print_selections(selected: pd.DataFrame, replication: str) -> None:
+    """The selected point of every policy, of how many missions or years, and the guarantee."""
     columns = ["setting", "missions", "left"]
     if "condition" in selected and any(selected["condition"]):
         columns = ["condition", *columns]
     cells = selected.set_index("policy")[columns]
     cells["missions"] = format_counts(cells["missions"])
+    cells = cells.rename(columns={"missions": f"{replication}s"})
     if "metric" in selected:
         measure = metric_of(selected["metric"].iloc[0])
         cells[measure.head] = decided.selected_by_cells(selected)

@@ -18,7 +18,15 @@ from dess.analysis.answers.fleet.requirements import metric_asked_for
 from dess.analysis.answers.fleet.risk import risk_facts
 from dess.analysis.answers.fleet.rule_of_thumb import RuleOfThumb, charging_slots, rule_of_thumb
 from dess.analysis.answers.settings.ranking import unequal_lengths
-from dess.analysis.ask import around, bisection, failure_rates, limit_search, limits, tried_fleet
+from dess.analysis.ask import (
+    around,
+    assumptions,
+    bisection,
+    failure_rates,
+    limit_search,
+    limits,
+    tried_fleet,
+)
 from dess.analysis.ask.answer import FleetAnswer, VariationAnswer
 from dess.analysis.ask.assumptions import assumption_facts
 from dess.analysis.ask.bisection import Bisection
@@ -500,6 +508,30 @@ def test_what_is_assumed_has_the_numbers_of_the_sheet(searched):
     assert found["slot"].startswith("21 s, a hundredth of the endurance of 35 min")
     assert found["cell"] == "315 m wide, the way of a slot at 15 m/s"
     assert found["charging"] == "from empty to full in 40 min"
+
+
+def test_what_is_assumed_says_what_nodes_have_when_a_mission_begins():
+    """A mission of 8 h a day leaves 16 h of data, which only an idle time brings into it."""
+    sheet = {"data_sheet.idle": None, "data_sheet.backlog": None, "data_sheet.horizon": "8 h"}
+    space = load_scenario("jade-bight", **sheet)
+    said = assumptions.data_at_the_start(space, set())
+    assert said.startswith("none, of age 0") and "the data of 16 h more" in said
+    whole = load_scenario("jade-bight", **sheet | {"data_sheet.horizon": "24 h"})
+    assert "once a day" not in assumptions.data_at_the_start(whole, set())
+    idle = load_scenario("jade-bight", **sheet | {"data_sheet.idle": "16 h"})
+    said = assumptions.data_at_the_start(idle, set())
+    assert said == "those of 16 h without a mission, which is their age"
+    more = load_scenario("jade-bight", **sheet | {"data_sheet.backlog": "2 MB"})
+    assert assumptions.data_at_the_start(more, set()).startswith("2 MB, of age 0")
+
+
+def test_what_is_assumed_says_what_slots_and_cells_follow_from():
+    space = load_scenario("jade-bight", **{"data_sheet.cruise": "12 m/s"})
+    assert assumptions.slot_in_words(space, set()) == (
+        "26.25 s, in which a UAV crosses a cell at 12 m/s"
+    )
+    assert assumptions.cell_in_words(space, set()) == "315 m wide at any cruising speed"
+    assert "26.25 s" not in assumptions.slot_in_words(space, {"cruise"})
 
 
 def test_a_limit_is_told_in_the_unit_of_the_sheet():

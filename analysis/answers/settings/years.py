@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
 
 FEW = 3  # fewer years tell nothing of others
+_NAMED = 5  # of more years, only the first and the last are named
 _DIGITS = 2  # of the ages in a headline
 _AGE_OF_MONTH = "age_h"  # the mean over the years in the table of a calendar
 _YOUNGEST, _OLDEST = "age_h_least", "age_h_most"  # of one of the years
@@ -222,7 +223,7 @@ def plot_calendar(calendar: pd.DataFrame, names: Mapping[str, str]) -> "Figure":
     reasons.sort(key=lambda name: name == NIGHT)  # on top
     places = np.arange(len(calendar))
     ratios = {"height_ratios": [1.0, 1.3]}
-    with style.new_panels(4.6, 2, "y", sharex=True, gridspec_kw=ratios) as (figure, (top, below)):
+    with style.new_panels(4.1, 2, "y", sharex=True, gridspec_kw=ratios) as (figure, (top, below)):
         ends = (calendar[_YOUNGEST], calendar[_OLDEST])
         top.fill_between(places, *ends, **style.band(style.INK))
         top.plot(places, calendar[_AGE_OF_MONTH], color=style.INK, marker="o", markersize=4)
@@ -242,6 +243,8 @@ def _years_in_words(results: Results, point: int, simulated: pd.Series) -> str:
     space = results.scenario(point)
     whole = years(hours_of(space))
     named = numbers.join_words([str(year) for year in simulated])
+    if len(simulated) > _NAMED:
+        named = f"{len(simulated)} from {simulated.min()} to {simulated.max()}"
     if len(simulated) < len(whole):
         return f"{named}, drawn from the {len(whole)} of {space.weather.path.name}"
     return f"{named}, all of {space.weather.path.name}"

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from dess import InputError
 from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.settings import years
 from dess.analysis.answers.settings.ranking import ranking_metric
@@ -103,8 +104,7 @@ def test_assumptions_tell_the_weather(asked):
     assumed = found_of(asked.assumptions())
     assert assumed["weather"].startswith("hour by hour, weather.csv")
     assert "20 m/s through the air" in assumed["wind"]
-    assert assumed["limits"] == "waves 1.5 m"
-    assert assumed["operating"] == "08:00-10:00, solar time"
+    assert assumed["operating"] == "08:00-10:00, solar time; limits: waves 1.5 m"
     assert assumed["window"].startswith("open hours in a row, at most 2 h")
     assert assumed["data at the start"].startswith("2 MB at the beginning of a year")
 
@@ -142,6 +142,12 @@ def test_changes_are_asked_in_few_years(asked, monkeypatch):
     monkeypatch.setattr(around, "YEARS", 1)
     asked_again = around.question_around(asked.results, asked.question.study.scenario)
     assert asked_again.study.years == 1
+
+
+def test_a_search_needs_two_years(tmp_path):
+    asked_for = ASKED | {"years": 1, "folder": tmp_path}
+    with pytest.raises(InputError, match="years: 1 is too few; allowed: 2 or more"):
+        sweep_question({"uavs": (1, 2)}, write_years(tmp_path), ["greedy"], **asked_for)
 
 
 def test_settings_of_years_are_ranked_by_the_age(asked):
