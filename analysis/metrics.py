@@ -53,6 +53,7 @@ class Metric:
             length are to be compared by it.
         among: Of how many nodes it is that of the worst one; 1 if it is not of a node. Intervals
             and tests hold for so many at once (``level_of_each``).
+        is_of_years: Whether its values are those of years with weather.
         told_unit: The unit in which a time is told that somebody has asked for in it, such as
             ``min``; empty for ``unit``. Its columns stay in ``unit``.
         group: The missions that have it (``metric_group``); None if nothing is known of it.
@@ -74,6 +75,7 @@ class Metric:
     fails: bool = True
     grows: bool = False
     among: int = 1
+    is_of_years: bool = False
     told_unit: str = ""
     group: Group | None = None
 
@@ -435,7 +437,7 @@ def metric_of_years(metric: Metric) -> Metric:
     """
     if metric.is_outcome:
         metric = replace(metric, kind="share")
-    return replace(metric, fails=False, failure=0.0)
+    return replace(metric, fails=False, failure=0.0, is_of_years=True)
 
 
 def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:

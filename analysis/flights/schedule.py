@@ -237,8 +237,8 @@ class Schedule:
         flight = uav.flight
         if self._with_landing(flight, place, 0.0).end < earliest:
             return None
-        held = (self._with_landing(flight, place, wait) for wait in _WAITS)
-        return self._first_free(held, uav)
+        landings = (self._with_landing(flight, place, wait) for wait in _WAITS)
+        return self._first_free(landings, uav)
 
     def _with_landing(self, flight: Route, place: Place, hold: float) -> Route:
         assert flight.phase

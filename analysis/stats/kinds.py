@@ -134,6 +134,23 @@ class Skewed:
         return np.where(slope == 0, quantile, root / np.where(slope == 0, 1, slope))
 
 
+class StudentOfYears:
+    """Student's interval of years, of which there are too few to tell their skewness.
+
+    Two years tell nothing of others, so their mean has no interval.
+    """
+
+    counts_missions: ClassVar[bool] = False
+
+    def ends(self, sample: Sample, level: Any) -> tuple[Any, Any]:
+        """The ends; nan for fewer than three years."""
+        n = np.asarray(sample.n)
+        error = np.sqrt(sample.variance / np.maximum(n - 1, 1))
+        half = stdtrit(np.maximum(n - 1, 1), (1 + level) / 2) * error
+        half = np.where(n > 2, half, np.nan)
+        return sample.mean - half, sample.mean + half
+
+
 def kind_of(metric: Metric, mean: Any = 0.0, is_of_outcomes: bool = False) -> Kind:
     """Which interval the mean of a metric has: here, and nowhere else, it is decided.
 
@@ -144,6 +161,8 @@ def kind_of(metric: Metric, mean: Any = 0.0, is_of_outcomes: bool = False) -> Ki
         is_of_outcomes: Whether they are of outcomes 0 or 1; those of ``success`` may be of means of
             such, which are shares.
     """
+    if metric.is_of_years:
+        return StudentOfYears()
     if metric.is_outcome and is_of_outcomes:
         return Wilson()
     if metric.has_range:

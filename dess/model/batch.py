@@ -132,8 +132,8 @@ def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
 def work_of(space: ScenarioSpace) -> int:
     """The most work of a slot of a mission: the loops of the engine, the guard and the policies."""
     nodes, fleet = len(space.nodes), space.uavs[1]
-    each = nodes * (nodes + space.communication_slots) + fleet * len(space.chart.parking)
-    return fleet * each + teeth_lengths([space])
+    work_of_uav = nodes * (nodes + space.communication_slots) + fleet * len(space.chart.parking)
+    return fleet * work_of_uav + teeth_lengths([space])
 
 
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:

@@ -55,7 +55,7 @@ def load_process(name: str) -> LoadedProcess:
     except Exception as error:  # code of others may raise anything; name it
         problem = f"cannot be loaded: {type(error).__name__}: {error}"
         raise InputError(f"process: {file.path}", problem, FORM) from error
-    functions = [known for known, value in names.items() if isgeneratorfunction(value)]
+    functions = [function for function, value in names.items() if isgeneratorfunction(value)]
     if file.name not in functions:
         problem = f"{shown(file.name)} is no function of it that yields events"
         raise unknown_name(f"process: {file.path}", problem, file.name, functions)

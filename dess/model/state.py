@@ -336,7 +336,9 @@ def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
     _number_energies(constants)
     ranges = np.stack([ranges_of(space) for space in spaces])
     types = np.stack([types_of(space, fleet) for space in spaces], dtype=UAV)
-    data, rates = (np.array([getattr(s, of) for s in spaces]) for of in ("node_data", "node_rates"))
+    data, rates = (
+        np.array([getattr(s, field) for s in spaces]) for field in ("node_data", "node_rates")
+    )
     ages, silent = np.zeros(rates.shape), np.zeros(rates.shape, np.bool_)
     return Starts(constants, ranges, types, data, rates, ages, silent)
 
@@ -392,5 +394,5 @@ def spaces_of(scenarios: Iterable[AnyScenario]) -> list[ScenarioSpace]:
     Raises:
         InputError: If there is no scenario of a name, or something is neither one nor a name.
     """
-    known = map(loaded, scenarios)
-    return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in known]
+    constants = map(loaded, scenarios)
+    return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in constants]

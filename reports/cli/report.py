@@ -80,8 +80,8 @@ def report(
     from dess.reports.pages.notebook import report_names
     from dess.reports.pages.render import render, render_study
 
-    known = report_names()
-    folders = [n for n in names or [] if os.sep in n or (n not in known and os.path.isdir(n))]
+    shipped = report_names()
+    folders = [n for n in names or [] if os.sep in n or (n not in shipped and os.path.isdir(n))]
     reports = [name for name in names or [] if name not in folders]
     with rendering_bar() as progress:
         if reports or not folders:

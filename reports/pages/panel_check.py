@@ -25,10 +25,10 @@ def check_panel(panel: Panel, page: str) -> list[str]:
         page: The text of the page.
     """
     if is_of_another_version(panel):
-        own = re.findall(_HASH, panel.render())
+        hashes = re.findall(_HASH, panel.render())
         return [
             f"mission {number} of its baseline differs"
-            for number, digest in enumerate(own)
+            for number, digest in enumerate(hashes)
             if digest not in page
         ]
     if _is_in(panel.render(), page):

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from dess import load_scenario, simulate_batch
 from dess.analysis.metrics import (
     AGE,
     LEAST_COST,
@@ -22,12 +23,14 @@ from dess.analysis.metrics import (
     PRODUCT,
     REWARD,
     metric_in_missions,
+    metric_in_space,
     metric_of,
 )
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (
     column_intervals,
+    interval_of,
     mean_interval,
     share_interval,
     stratified_interval,
@@ -520,3 +523,17 @@ def test_the_interval_of_a_learner_covers_trainings_and_missions(trainings, tria
     assert holds(float(np.mean(new)), trials)
     missions_alone = (mean_interval(d.mean(axis=0))[1:] for d, _ in drawn)
     assert covered(missions_alone, 0.0) < 0.75
+
+
+@pytest.mark.slow
+def test_the_interval_of_a_few_years_covers_the_mean_of_all():
+    space = load_scenario("new-jersey", uavs=1)
+    ages = simulate_batch(space, "greedy", 0, 31).operations["age"]
+    rng = np.random.default_rng(6)
+    metric = metric_in_space("age", space)
+    for years in (4, 10, 20):
+        covers = 0
+        for _ in range(2000):
+            interval = interval_of(metric, rng.choice(ages, years, replace=False))
+            covers += interval.low <= ages.mean() <= interval.high
+        assert covers >= 0.93 * 2000

@@ -98,10 +98,10 @@ def format_with_mark(estimate: Any, printed: Interval) -> str:
 
     The mark tells whether the interval of this difference lies above 0 or below it.
     """
-    own = Interval(estimate.mean, estimate.low, estimate.high)
-    mark = MARKS[position_of(difference_of_intervals(own, printed))]
+    ours = Interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position_of(difference_of_intervals(ours, printed))]
     difference = numbers.format_difference(estimate.mean, printed.mean)
-    return f"{numbers.format_interval(*own)} {difference} {mark}"
+    return f"{numbers.format_interval(*ours)} {difference} {mark}"
 
 
 def metrics_of_policy(means: pd.DataFrame, policy: str) -> pd.Series:

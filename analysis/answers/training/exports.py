@@ -29,9 +29,9 @@ def rliable_scores(results: Results, metric: str = PRODUCT) -> dict[str, np.ndar
         InputError: If there is no such metric, a policy has fewer missions than there are runs, or
             learners have different numbers of trainings.
     """
-    known = metric_group("paper", "reward")
-    if metric not in known:
-        raise unknown_name("metric", f"{metric!r} is unknown", metric, known)
+    metrics = metric_group("paper", "reward")
+    if metric not in metrics:
+        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
     algorithms = _policies_of_runs(results)
     points = range(len(results.store.manifest.points))
     runs = len(next(iter(algorithms.values())))

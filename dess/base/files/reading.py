@@ -78,13 +78,13 @@ def version_of(path: Path) -> tuple[int, int]:
         InputError: If it cannot be looked at.
     """
     try:
-        found = path.stat()
+        status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
         raise Missing(path, "no such file", "a file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, f"cannot be read: {reason}", "a file") from None
-    return found.st_mtime_ns, found.st_size
+    return status.st_mtime_ns, status.st_size
 
 
 def hash_file(path: Path, limit: int) -> str:

@@ -10,12 +10,15 @@ import pytest
 from dess import InputError, simulate, simulate_batch
 from dess.model import mission
 from dess.model.campaign import HOUR, MOST_HOURS, Campaign, plan_of, repair_in_gap, years_of
+from dess.model.channel import world_of
 from dess.model.record import AGES_OF_MONTHS, MissionRecord
 from dess.model.state import BATTERY
-from dess.model.years import WindowStart, start_of_window
+from dess.model.view import decide
+from dess.model.years import WindowStart, Years, _advance, start_of_window
 from dess.policies import load
 from dess.scenario.rotary_wing import COURSES, RotaryWing, airspeed_along
 from dess.scenario.scenario import ScenarioSpace, load_scenario
+from dess.scenario.weather.hours import hours_of
 from tests.dess.model.auditor import audit
 from tests.dess.model.test_auditor import check_nodes, constants_of
 
@@ -282,34 +285,31 @@ def test_a_fleet_that_is_drawn_has_no_years(write):
 
 
 @pytest.mark.slow
-def test_an_auditor_replays_windows_of_ten_years():
+def test_an_auditor_replays_windows_of_ten_years(monkeypatch):
     space = load_scenario("new-jersey", uavs=2, **{"data_sheet.cruise": "12 m/s"})
-    order = years_of(space, 0)
-    rng = np.random.default_rng(4)
-    replayed = 0
-    for year in order[:10]:
-        windows = plan_of(space, year).windows
-        first = int(rng.integers(len(windows) - 30))
-        replayed += _audit_windows(space, year, first, 30)
-    assert replayed == 300
+    places = np.random.default_rng(4).integers(600, size=10)
+    starts: list[WindowStart] = []
+    begin = Campaign.begin_window
 
+    def keep(self: Campaign, rows: Any, b: int) -> int:
+        number = begin(self, rows, b)
+        if number >= 0 and 0 <= self.next - places[self.replication] < 30:
+            row = type(rows)(*(array[b : b + 1].copy() for array in rows))
+            row.constants["energy"] = 0
+            starts.append(WindowStart(self.scenario_of_window(), row, number))
+        return number
 
-def _audit_windows(space: ScenarioSpace, year: Any, first: int, count: int) -> int:
-    """Replay windows of a year from one on; they begin with what the ones before have left."""
-    from dess.scenario.weather.hours import hours_of
-
-    begin = hours_of(space).first + year.first
-    for window in plan_of(space, year).windows[first : first + count]:
-        start = start_of_window(space, [GREEDY], 0, str(begin + window.first))
-        record = mission.simulate(
-            start.scenario, GREEDY, 0, start.replication, starts=start.starts, events=True
-        )
+    monkeypatch.setattr(Campaign, "begin_window", keep)
+    simulate_batch(space, GREEDY, 0, 10)
+    assert len(starts) == 300
+    for start in starts:
+        about = (start.scenario, GREEDY, 0, start.replication)
+        record = mission.simulate(*about, starts=start.starts, events=True)
         assert record.events is not None and record.nodes is not None
         report = audit(record.events.columns(), constants_of(start.scenario) | before(start))
         check_nodes(record.nodes, report["nodes"])
         wanted = {n: pytest.approx(record.metrics[n], abs=1e-6) for n in report["metrics"]}
         assert report["metrics"] == wanted
-    return count
 
 
 def before(start: WindowStart) -> dict[str, Any]:
@@ -322,3 +322,33 @@ def before(start: WindowStart) -> dict[str, Any]:
     batteries = [(u["battery"] if u["x"] >= 0 else full, u["remainder"]) for u in rows]
     left = start.starts.data[0, :, 0] - np.array(start.scenario.node_rates) * idle
     return {"before": {"idle": idle, "data": left, "ages": start.starts.ages[0], "uavs": batteries}}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("uavs", "operating"), [(1, "daylight"), (1, "always"), (2, "daylight")])
+def test_hardly_a_uav_is_lost_where_slots_take_what_their_hours_take(uavs, operating):
+    """Guard and policy plan with the most expensive hour; each hour takes what it takes."""
+    weather = {"weather.operating": operating, "data_sheet.cruise": "12 m/s"}
+    space = load_scenario("new-jersey", uavs=uavs, **weather)
+    hours = hours_of(space)
+    windows = lost = 0
+    for number, year in enumerate(years_of(space, 0)[:3]):
+        campaign = Campaign(space, 0, number)
+        years = Years([campaign], world_of(space))
+        years._begin_window(0)
+        missions, shown = years.state.missions, years.world.shown()
+        while years.has_window[0]:
+            planned = missions["slot_costs"][0].copy()
+            decide([GREEDY], years.state, shown, years.ways)
+            hour = int(missions["slot"][0] * space.units.slot / 3600)
+            first = year.first + campaign.plan.windows[campaign.next].first
+            missions["slot_costs"][0] = hours.costs[first + hour].reshape(-1)
+            assert (missions["slot_costs"][0][:5] <= planned[:5]).all()
+            ended = _advance(years.has_window, years.state, years.world, years.scratch)
+            missions["slot_costs"][0] = planned
+            if len(ended):
+                years._end_window(0)
+                years._begin_window(0)
+        windows += campaign.totals.windows
+        lost += int(campaign.totals.uavs["down"].sum())
+    assert windows > 1900 and lost <= windows / 1000
