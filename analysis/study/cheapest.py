@@ -258,7 +258,7 @@ class Cheapest(StrictTable):
         ge=1e-6,
         le=0.5,
         description="half-width of the zone in which either verdict is acceptable; of age a share "
-        "of the horizon",
+        "of the horizon and the idle time",
     )
     indifference: Number = Field(
         ge=1e-9, le=10**15, description="the least saving that matters, in the currency"
