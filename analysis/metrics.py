@@ -232,6 +232,8 @@ _UNITS = {"min": ("slot", 60.0), "h": ("slot", 3600.0), "MB": ("data", 8e6), "km
 DRAWN_UNITS = {"length": "km", "time": "h", "data": "MB"}
 # The columns of the longest that each mission may last, and that a UAV may wait for a pad in it.
 MOST_SLOTS, MOST_WAITING = "most_slots", "most_waiting"
+# The column of how long nodes were idle before each mission, which their ages begin with.
+IDLE = "idle"
 # The columns of the least and the most that each mission may cost.
 LEAST_COST, MOST_COST = "least_cost", "most_cost"
 
@@ -329,6 +331,7 @@ _GROUPS["amounts"] = (
     _time_metric("slots", "Length of the mission"),
     _time_metric(MOST_SLOTS, "Longest that the mission may last"),
     _time_metric(MOST_WAITING, "Longest that a UAV may wait for a pad"),
+    _time_metric(IDLE, "How long nodes were idle before the mission"),
     _time_metric("uav_slots", "UAV-hours", is_sum=True),
     _amount_metric(COLLECTED, "Data collected", _DATA, "MB"),
     _amount_metric("collected_per_uav", "Data collected per UAV", _DATA, "MB"),
@@ -387,7 +390,9 @@ def metric_of(column: str | Metric) -> Metric:
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
 
 
-def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 1) -> Metric:
+def metric_for_length(
+    column: str, slots: int, units: Units | None, uavs: int = 1, idle: float = 0.0
+) -> Metric:
     """The metric of a column of missions of at most this length, with its range.
 
     Args:
@@ -395,11 +400,14 @@ def metric_for_length(column: str, slots: int, units: Units | None, uavs: int = 
         slots: The longest that a mission, or what the metric measures in it, may last.
         units: What a slot is, of missions with a data sheet.
         uavs: The most UAVs that a mission has.
+        idle: How long nodes were idle before it, which ages begin with [slots].
     """
     metric = metric_of(column)
     if not metric.horizons:
         return metric
     longest = metric.horizons * slots
+    if metric.grows:
+        longest += idle
     if units and metric.is_in_sheet_unit:
         longest *= size_of(metric.unit, units)
     if metric.is_sum:
@@ -442,7 +450,7 @@ def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
     slots = space.longest_slots
     if metric_of(column).is_wait:
         slots = longest_wait(space)
-    metric = metric_for_length(column, slots, space.units, space.uavs[1])
+    metric = metric_for_length(column, slots, space.units, space.uavs[1], space.idle_slots)
     if space.weather.is_on:
         metric = metric_of_years(metric)
     if column in NODES_BEHIND:
@@ -541,14 +549,16 @@ def _ranges_by_metric(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
         return metric.range[0], np.where(np.asarray(missions[MOST_WAITING]) > 0, inf, 0.0)
     if not metric.horizons:
         return metric.range
-    longest = metric_of(MOST_SLOTS)
+    longest, idle = metric_of(MOST_SLOTS), metric_of(IDLE)
     if metric.is_wait and MOST_WAITING in missions:
         longest = metric_of(MOST_WAITING)
     if metric.is_in_sheet_unit:
-        longest = longest.in_units
+        longest, idle = longest.in_units, idle.in_units
     if longest.column not in missions or (metric.is_sum and "uavs" not in missions):
         return metric.range
     most = metric.horizons * np.asarray(missions[longest.column], float)
+    if metric.grows and idle.column in missions:
+        most += np.asarray(missions[idle.column])
     if metric.is_in_sheet_unit:
         most *= _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
     if metric.is_sum:

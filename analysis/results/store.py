@@ -27,6 +27,7 @@ from dess import InputError
 from dess.analysis.bound import Bound
 from dess.analysis.metrics import (
     COST,
+    IDLE,
     LEAST,
     LEAST_COST,
     MOST_COST,
@@ -459,9 +460,10 @@ class Store:
     def missions(self, parts: Sequence[CellPart]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.
 
-        ``most_slots`` is the longest that each may last, and ``most_waiting`` the longest that a
-        UAV may wait in it. If the study has prices, the missions have a ``cost``, and the least and
-        the most that each may cost; with a data sheet, what they measure is there in units as well
+        ``most_slots`` is the longest that each may last, ``most_waiting`` the longest that a UAV
+        may wait in it, and ``idle``, where nodes were idle before it, for how long. If the study
+        has prices, the missions have a ``cost``, and the least and the most that each may cost;
+        with a data sheet, what they measure is there in units as well
         (``metrics.columns_in_units``).
 
         Raises:
@@ -472,6 +474,9 @@ class Store:
         points = missions["point"].to_numpy()
         missions[MOST_SLOTS] = np.array([space.longest_slots for space in spaces])[points]
         missions[MOST_WAITING] = np.array([longest_wait(space) for space in spaces])[points]
+        idle = np.array([space.idle_slots for space in spaces])
+        if idle.any():
+            missions[IDLE] = idle[points]
         if costs := self.manifest.study.costs:
             cost = costs.parts(spaces, missions, self.uavs(parts))
             missions[COST] = sum(cost.values())

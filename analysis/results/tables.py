@@ -115,10 +115,11 @@ class Results:
             ``MISSION_RECORD``, then those of ``OPERATIONS`` that were measured, with nan where a
             mission lacks one. Rows are in the order of the policies in the study, then of point
             and replication. ``most_slots`` is the longest that each may last, and ``most_waiting``
-            the longest that a UAV may wait for a pad in it. If the study has prices, ``cost`` comes
-            next, with ``least_cost`` and ``most_cost``, between which each mission lies; with a
-            data sheet, times and data follow in units, such as ``age_h``. If it has bounds, the
-            last columns are ``upper_bound``, and ``optimality_gap``: the bound minus the product.
+            the longest that a UAV may wait for a pad in it; ``idle`` is how long nodes were idle
+            before it, if any were. If the study has prices, ``cost`` comes next, with
+            ``least_cost`` and ``most_cost``, between which each mission lies; with a data sheet,
+            times and data follow in units, such as ``age_h``. If it has bounds, the last columns
+            are ``upper_bound``, and ``optimality_gap``: the bound minus the product.
         uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
             the fields of ``UAV_RECORD``, with ``end`` as a name.
         checks: Further missions, in rows as above, of the design points that were selected; the

@@ -205,14 +205,14 @@ class Setting(NamedTuple):
 
 
 def horizon_of(space: ScenarioSpace) -> float:
-    """What tolerances of ages are shares of: the length of a mission, or a day in years.
+    """What tolerances of ages are shares of: the largest age in a mission, or a day in years.
 
     Returns:
         It is in hours with a data sheet, otherwise in slots.
     """
     if space.weather.is_on:
         return 24.0
-    return space.max_slots * (size_of("h", space.units) if space.units else 1)
+    return (space.max_slots + space.idle_slots) * (size_of("h", space.units) if space.units else 1)
 
 
 def as_share(metric: str, value: Any, horizon: float) -> Any:
@@ -273,7 +273,7 @@ class Cheapest(StrictTable):
         ge=1e-6,
         le=0.5,
         description="half-width of the zone in which either verdict is acceptable; of age a share "
-        "of the horizon",
+        "of the horizon and the idle time",
     )
     indifference: Number = Field(
         ge=1e-9, le=10**15, description="the least saving that matters, in the currency"

@@ -354,7 +354,7 @@ def _bounds_of(space: ScenarioSpace, fleet: int) -> np.ndarray:
     bounds = np.empty((len(METRICS), 4))
     for column, name in enumerate(METRICS):
         unit = metric_of(name).in_units.column if space.units else name
-        metric = metric_for_length(unit, space.max_slots, space.units, fleet)
+        metric = metric_for_length(unit, space.max_slots, space.units, fleet, space.idle_slots)
         bounds[column] = *metric.range, metric.failure, 1 - LEVEL
     return bounds
 

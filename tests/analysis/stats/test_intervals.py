@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from dess import load_scenario
 from dess.analysis.metrics import (
     MOST_SLOTS,
     OLDEST,
@@ -16,6 +17,7 @@ from dess.analysis.metrics import (
     SUCCESS,
     metric_for_length,
     metric_in_missions,
+    metric_in_space,
 )
 from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (
@@ -28,6 +30,7 @@ from dess.analysis.stats.intervals import (
     stratified_interval,
 )
 from dess.analysis.stats.kinds import skewness_of
+from dess.analysis.study.cheapest import horizon_of
 
 SAMPLES = st.lists(st.floats(0, 1), min_size=1, max_size=60)
 
@@ -136,6 +139,22 @@ def test_an_interval_of_an_age_holds_the_mean_and_ends_where_ages_do(ages, level
         "age", ["low", "high"]
     ]
     assert ends.between(0, 250).all()
+
+
+@pytest.mark.parametrize(("column", "most"), [("age", 20.0), ("oldest", 20.0), ("age_p99", 24.0)])
+def test_ages_of_nodes_that_were_idle_end_where_the_idle_time_has_become_older(column, most):
+    """Of 16 h before a mission of 8 h the mean is at most 20 h, which a rare mission may have."""
+    space = load_scenario("jade-bight", **{"age.measured": True, "data_sheet.idle": "16 h"})
+    metric = metric_in_space(f"{column}_h", space)
+    assert metric.range == (0.0, pytest.approx(most, abs=0.01))
+    missions = pd.DataFrame({f"{column}_h": [13.0], "most_slots_h": 8.0, "idle_h": 16.0})
+    assert metric_in_missions(missions, f"{column}_h").range == (0.0, most)
+    _, low, high = interval_of(metric, np.full(100, 13.0))
+    assert low < 13 < high
+    fresh = load_scenario("jade-bight", **{"age.measured": True, "data_sheet.idle": None})
+    assert metric_in_space(f"{column}_h", fresh).range[1] == pytest.approx(most - 16, abs=0.01)
+    assert horizon_of(space) == pytest.approx(24, abs=0.01)
+    assert horizon_of(fresh) == pytest.approx(8, abs=0.01)
 
 
 def test_the_moments_of_parts_are_those_of_the_whole():

@@ -107,6 +107,7 @@ def test_an_auditor_finds_the_records_of_nodes_in_the_log_of_packets(data):
     changes = {
         "data_sheet.horizon": "1 h",
         "data_sheet.message": "500 kB",
+        "data_sheet.idle": None,  # which needs slotted arrivals
         "arrivals.process": "continuous",
         "failures": failures | {"uav_repair": 20.0},
         "age.measured": True,
