@@ -282,3 +282,15 @@ def test_what_years_do_not_decide_and_missions_do_not_measure_is_refused(
 
 def test_late_data_are_required_at_most():
     assert as_share("late", 0.1, 24.0) == 0.9 and as_share("success", 0.1, 24.0) == 0.1
+
+
+def test_spares_are_bought_like_uavs_and_days_follow_from_the_weather():
+    costs = Costs.model_validate({"uav": 100, "pad": 10, "years": 5})
+    for spares, fleet in ((0, 2), (1, 3)):
+        space = load_scenario("new-jersey", uavs=2, **{"data_sheet.spares": spares})
+        costs.check([space])
+        assert costs.price_of_fleet(space) == 100 * fleet + 10 * space.charging_pads
+    with pytest.raises(InputError, match="costs: days: follows from the weather"):
+        costs.model_copy(update={"days": 200}).check([space])
+    with pytest.raises(InputError, match="costs: days: is missing"):
+        costs.check([load_scenario("jade-bight")])
