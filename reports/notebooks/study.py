@@ -153,15 +153,16 @@ show_parts(year_table(study, *page.shown_setting(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## How far to trust it
-#
+
+# %% [markdown] tags=["if-cheapest", "if-missions"]
 # The check had no part in the selection, so its means are unbiased.
 
-# %% tags=["if-cheapest"]
+# %% tags=["if-cheapest", "if-missions"]
 no_check = write_markdown("No setting was checked.")
-show_parts(
-    no_check if study.checks.empty else fleet_tables.check_table(study),
-    write_markdown("{guarantees}", guarantees=page.list_guarantees(study)),
-)
+show_parts(no_check if study.checks.empty else fleet_tables.check_table(study))
+
+# %% tags=["if-cheapest"]
+write_markdown("{guarantees}", guarantees=page.list_guarantees(study))
 
 # %% [markdown] tags=["if-settings"]
 # ## The best settings
