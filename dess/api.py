@@ -79,6 +79,7 @@ def simulate_batch(
             stands for what ``dess.policies.load_team`` loads.
         seed: Seed of all missions.
         replications: The replication numbers, or a number n for the replications 0 to n - 1.
+            With weather, each is a year.
         workers: Number of threads; the compiled code does not hold Python's global lock.
         batch_size: Missions in progress per thread; fewer if a slot of them would take long.
         progress: Called with the number of missions finished since its last call.

@@ -56,6 +56,7 @@ def simulate_batch(
         policy: A policy, or a list of policies; UAV i follows ``policy[i % len(policy)]``.
         seed: Seed of all missions.
         replications: The replication numbers, or a number n for the replications 0 to n - 1.
+            With weather, each is a year.
         workers: Number of threads; the compiled code does not hold Python's global lock.
         batch_size: Missions in progress per thread; fewer if a slot of them would take long.
         progress: Called with the number of missions finished since its last call.
