@@ -116,7 +116,7 @@ class MeanTest:
             self.verdict = judge_facts(kept == first, broken == first, margin)
 
 
-class TestOfYears:
+class YearsTest:
     """A test of whether a mean meets a requirement, by all values at once.
 
     There are far too few years for bets. So the interval is Student's, which holds once: for

@@ -25,7 +25,7 @@ from dess.analysis.metrics import (
     size_of,
 )
 from dess.analysis.names import DECISIONS
-from dess.analysis.stats.betting import MeanTest, TestOfYears, WorstNodeTest
+from dess.analysis.stats.betting import MeanTest, WorstNodeTest, YearsTest
 from dess.analysis.stats.verdict import Verdict
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Chosen, Selection, based_on, check_begun, missions_needed
@@ -488,10 +488,10 @@ AnySelection = Annotated[
 ]
 
 
-def _kind_of_test(metric: str, setting: Setting) -> type[MeanTest | WorstNodeTest | TestOfYears]:
+def _kind_of_test(metric: str, setting: Setting) -> type[MeanTest | WorstNodeTest | YearsTest]:
     """How a requirement of a setting is tested."""
     if setting.is_of_years:
-        return TestOfYears
+        return YearsTest
     if metric in _OF_NODES:
         return WorstNodeTest
     return MeanTest

@@ -218,14 +218,7 @@ class Campaign:
         return -1
 
     def _prepare_fleet(self, begin: int, number: int) -> bool:
-        """Repair, charge and replace UAVs until a window begins; return whether there is one."""
-        gap = (begin - self.clock) / self.slot
-        mission = self.mission[0]
-        grounded = np.array([uav.state["grounded"] for uav in self.fleet])
-        repair_in_gap(mission, number, gap, self.silent, grounded)
-        for uav, is_grounded in zip(self.fleet, grounded, strict=True):
-            uav.state["grounded"] = is_grounded
-        self.charge(gap)
+        """Replace, repair and charge UAVs until a window begins; return whether there is one."""
         awaited = [arrives for arrives in self.ordered if arrives > begin]
         self.spares += len(self.ordered) - len(awaited)
         self.ordered = awaited
@@ -237,7 +230,15 @@ class Campaign:
                 uav.arrives = 0
             if uav.arrives <= begin and (uav.has_cell or self._put_on_free_cell(uav)):
                 self.flying.append(uav)
-        return bool(self.flying)
+        if not self.flying:  # the gap goes on, so that nothing in it happens yet
+            return False
+        gap = (begin - self.clock) / self.slot
+        grounded = np.array([uav.state["grounded"] for uav in self.fleet])
+        repair_in_gap(self.mission[0], number, gap, self.silent, grounded)
+        for uav, is_grounded in zip(self.fleet, grounded, strict=True):
+            uav.state["grounded"] = is_grounded
+        self.charge(gap)
+        return True
 
     def _put_on_free_cell(self, uav: Uav) -> bool:
         """Put a new UAV on the first free cell of a zone, if another UAV stands in some zone."""

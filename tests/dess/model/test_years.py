@@ -352,3 +352,20 @@ def test_hardly_a_uav_is_lost_where_slots_take_what_their_hours_take(uavs, opera
         windows += campaign.totals.windows
         lost += int(campaign.totals.uavs["down"].sum())
     assert windows > 1900 and lost <= windows / 1000
+
+
+def test_a_gap_in_which_no_uav_is_there_is_repaired_once(write, monkeypatch):
+    space = sea(write(first_days(4, 8, 14)), {"delivery": "2 d"})
+    gaps: list[float] = []
+    end = Campaign.end_window
+
+    def lose(self: Campaign, record: MissionRecord, state: Any, b: int) -> None:
+        state.uavs["end"][b, 0] = BATTERY
+        end(self, record, state, b)
+
+    monkeypatch.setattr(Campaign, "end_window", lose)
+    repair = "dess.model.campaign.repair_in_gap"
+    monkeypatch.setattr(repair, lambda mission, number, gap, *nodes: gaps.append(gap))
+    simulate_batch(space, GREEDY, 0, 1)
+    # Windows begin at hours 8, 32, 56 and 80; after the first one, no UAV is there until hour 62.
+    np.testing.assert_allclose(gaps, [8 * 3600 / 21, 66 * 3600 / 21], atol=1)
