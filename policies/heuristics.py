@@ -146,7 +146,7 @@ def choose_at_random(mission, team, i, allowed, sizes):
 
     ``allowed`` has a bit for each action.
     """
-    levels = contests(mission, team, i, sizes)
+    levels = contests(mission, team, i, sizes, None)
     moves = count = 0
     for action in range(4):
         if allowed >> action & 1 and contest(levels, action) == 0:
@@ -208,7 +208,7 @@ def choose_action(
 def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
-    levels = contests(mission, team, i, chart.sizes)
+    levels = contests(mission, team, i, chart.sizes, None)
     best = HOVER
     least = 1e18
     for action in range(5):

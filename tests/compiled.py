@@ -134,4 +134,4 @@ def step_cost(mission, uavs, i, chart, action, x, y):
     u = uavs[i]
     after = u.x + STEP_X[action], u.y + STEP_Y[action]
     way = ways.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
-    return way, moves.contest(moves.contests(mission, uavs, i, chart.sizes), action)
+    return way, moves.contest(moves.contests(mission, uavs, i, chart.sizes, None), action)

@@ -17,7 +17,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import late_slots, margin, margin_slots, usable_battery
-from dess.model.guard.queues import find_ways, is_given_up, needs_pad
+from dess.model.guard.queues import KEPT, find_ways, is_given_up, needs_pad
 from dess.model.guard.ways import battery_of_way
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics.chart import distance, is_open, length_around
@@ -47,8 +47,8 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         uavs: (I,) ``UAV`` records.
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
-        plan: ``Plan``; the zone of each UAV is written into it, when it can be there, and which
-            zones are full.
+        plan: ``Plan``; the zone of each UAV is written into it, when it can be there, and whether
+            it leaves its cell; and which zones are full.
         reach: ``Ways.reach``.
     """
     prices = np.full((mission.uavs, mission.zones), _NO_WAY, np.int64)
@@ -81,6 +81,26 @@ def match_zones(mission, uavs, data, chart, plan, reach):
         plan.queues[zone].change = 0
         if left[zone] <= 0:
             _match_cells(mission, uavs, zone, chart, plan.turns, closed, reach)
+    for j in range(mission.uavs):
+        plan.turns[j].leaves = _leaves_cell(mission, uavs[j], plan.turns[j], chart)
+
+
+@inlined
+def _leaves_cell(mission, u, turn, chart):
+    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one.
+
+    One that has just been overruled on its way to such a cell stays where it is: a teammate wants
+    the same cell, and they would block each other. So does one whose battery is nearly empty.
+    """
+    if u.zone < 0 or turn.zone < 0:
+        return False
+    if turn.cell < 0:
+        return u.zone != turn.zone
+    x, y = chart.parking[turn.cell, 0], chart.parking[turn.cell, 1]
+    cells = distance(chart, u.x, u.y, x, y)
+    kept = waiting_slot(mission) * (cells * u.slots_per_cell + 1 + KEPT)
+    moves_on = cells > 0 and not u.overruled and usable_battery(mission, u) > kept
+    return u.zone != turn.zone or moves_on
 
 
 @inlined

@@ -62,8 +62,21 @@ _MOST_BATTERY = 2**40  # more than any way costs
 
 
 @inlined
-def contests(mission, uavs, i, sizes):
+def _keeps_others_out(mission, uavs, j, sizes, turns):
+    """Whether UAV ``j`` is parked, and is not about to leave its cell for a teammate.
+
+    The plan of a mission that ends on the ground tells this. A teammate flies into the cell that is
+    left: around it, both might come to each other's way again and again.
+    """
+    leaves = turns is not None and lands(mission) and turns[j].leaves
+    return is_parked(mission, uavs[j], sizes) and not leaves
+
+
+@inlined
+def contests(mission, uavs, i, sizes, turns):
     """Whether teammates of UAV ``i`` may occupy the cells that its actions lead to.
+
+    ``turns`` are those of ``parking_memory``, or None.
 
     Returns:
         Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate
@@ -77,7 +90,7 @@ def contests(mission, uavs, i, sizes):
         east, south = o.x - u.x, o.y - u.y
         if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
-        parked = is_parked(mission, o, sizes)
+        parked = _keeps_others_out(mission, uavs, j, sizes, turns)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -97,7 +110,7 @@ def contest(levels, action):
 
 
 @inlined
-def _ceded(mission, uavs, i, sizes):
+def _ceded(mission, uavs, i, sizes, turns):
     """The actions of UAV ``i`` that may hinder teammates with less battery which come to charge.
 
     Returns:
@@ -111,7 +124,9 @@ def _ceded(mission, uavs, i, sizes):
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         if j == i or not goes_first or abs(east) + abs(south) > 2:
             continue
-        if not o.latch or not will_charge(mission, o) or is_parked(mission, o, sizes):
+        if not o.latch or not will_charge(mission, o):
+            continue
+        if _keeps_others_out(mission, uavs, j, sizes, turns):
             continue
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -201,22 +216,23 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
         The safe actions, a bit for each.
     """
     u = uavs[i]
-    parked = is_parked(mission, u, chart.sizes) and not (lands(mission) and home.gives_way == 1)
+    turns = memory.plan.turns
+    parked = _keeps_others_out(mission, uavs, i, chart.sizes, turns)
     if charge and _keeps_its_place(mission, u, parked):
         return 1 << HOVER
-    levels = contests(mission, uavs, i, chart.sizes)
+    levels = contests(mission, uavs, i, chart.sizes, turns)
     # Teammates fly around a parked UAV, so it need not leave its cell for any.
     contested = levels & ~(3 << 2 * HOVER) if parked else levels
     moves = _sort_moves(mission, uavs, i, chart, charge, home, memory.planned, contested, reach)
     if not parked:
-        leaving = _leaving_moves(mission, uavs, i, chart, moves)
+        leaving = _leaving_moves(mission, uavs, i, chart, turns, moves)
         if leaving:
             return leaving
     if charge and moves.lacking == 0 and lands(mission):
         nearest = moves.nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory)
         nearest = nearest or moves.nearest
         moves = Moves(nearest, moves.in_time, moves.clear, moves.empty, moves.lacking)
-    return _choose_moves(mission, uavs, i, chart, moves, levels)
+    return _choose_moves(mission, uavs, i, chart, turns, moves, levels)
 
 
 @inlined
@@ -283,7 +299,7 @@ def _asks_too_early(home, action):
 
 
 @inlined
-def _leaving_moves(mission, uavs, i, chart, moves):
+def _leaving_moves(mission, uavs, i, chart, turns, moves):
     """The actions by which UAV ``i`` leaves its cell if it stands in the way; 0 if it may stay."""
     elsewhere = moves.nearest & ~(1 << HOVER)
     if not elsewhere or not _is_in_the_way(mission, uavs, i):
@@ -291,7 +307,7 @@ def _leaving_moves(mission, uavs, i, chart, moves):
     u = uavs[i]
     leaving = elsewhere & moves.empty or elsewhere & moves.clear
     if not leaving and mission.slot % 2 == 1:  # in the other slots, it lets them go first
-        leaving = elsewhere & ~_ceded(mission, uavs, i, chart.sizes)
+        leaving = elsewhere & ~_ceded(mission, uavs, i, chart.sizes, turns)
     if u.overruled and u.zone >= 0 and is_tight(mission, chart.sizes):
         # A teammate may want the same cell again and again, so it tries one after another, and
         # lets the teammate go first in some slots.
@@ -301,7 +317,7 @@ def _leaving_moves(mission, uavs, i, chart, moves):
 
 
 @inlined
-def _choose_moves(mission, uavs, i, chart, moves, levels):
+def _choose_moves(mission, uavs, i, chart, turns, moves, levels):
     """The safe actions of UAV ``i`` that neither keeps its place nor leaves it for a teammate."""
     u = uavs[i]
     is_late = moves.lacking > 0
@@ -317,7 +333,7 @@ def _choose_moves(mission, uavs, i, chart, moves, levels):
     if u.overruled and (is_late or moves.nearest >> HOVER & 1):
         return 1 << HOVER
     if not is_late and levels > 0:
-        yielding = moves.nearest & ~_ceded(mission, uavs, i, chart.sizes)
+        yielding = moves.nearest & ~_ceded(mission, uavs, i, chart.sizes, turns)
         return yielding or moves.nearest or 1 << HOVER
     return moves.nearest or 1 << HOVER  # who gives way may have nowhere to go
 

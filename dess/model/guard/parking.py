@@ -8,7 +8,6 @@ from dess.base.kernels import inlined, kernel, shared_kernel
 from dess.model.guard.battery import late_slots, margin_slots, usable_battery
 from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
-    KEPT,
     QUEUE,
     TURN,
     Plan,
@@ -26,7 +25,6 @@ from dess.model.guard.ways import (
 )
 from dess.model.ways import is_calm
 from dess.physics.chart import distance
-from dess.physics.energy import waiting_slot
 from dess.physics.landing import lands
 from dess.scenario.fields import MOST_ZONES
 
@@ -125,6 +123,7 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
     """
     for j in range(mission.uavs):
         memory.plan.turns[j].zone = memory.plan.turns[j].cell = -1
+        memory.plan.turns[j].leaves = 0
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
@@ -140,8 +139,7 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
     home = _choose(mission, uavs, i, chart, memory, reach)
     if is_matched:
         wait = _slots_for_others(mission, uavs, i, memory.plan.turns)
-        zone = memory.plan.turns[i].zone
-        gives_way = np.int64(_leaves_cell(mission, uavs[i], zone, home, memory.plan))
+        gives_way = memory.plan.turns[i].leaves
     return Home(home.x, home.y, home.cells, wait, begins, gives_way)
 
 
@@ -163,21 +161,6 @@ def _slots_for_others(mission, uavs, i, turns):
         if usable_battery(mission, uavs[j]) - turns[j].spent[zone] <= spare:
             count += 1
     return count * uavs[i].slots_per_cell
-
-
-@inlined
-def _leaves_cell(mission, u, zone, home, plan):
-    """Whether a UAV is in a zone, but matched to another one, or to another cell of a full one.
-
-    One that has just been overruled on its way to such a cell stays where it is: a teammate wants
-    the same cell, and they would block each other. So does one whose battery is nearly empty.
-    """
-    if u.zone < 0 or zone < 0:
-        return False
-    is_elsewhere = u.x != home.x or u.y != home.y
-    kept = waiting_slot(mission) * (home.cells * u.slots_per_cell + 1 + KEPT)
-    moves_on = not u.overruled and usable_battery(mission, u) > kept
-    return u.zone != zone or (plan.queues[zone].is_full and is_elsewhere and moves_on)
 
 
 @inlined

@@ -56,6 +56,7 @@ TURN = np.dtype(
         ("zone", np.int64),  # the zone where it will charge, -1 if it need not
         # The number of its cell in a full zone, else -1 (``dess.model.guard.matching``).
         ("cell", np.int64),
+        ("leaves", np.int64),  # whether it is in a zone, but matched to another cell (the same)
         # The slots to the nearest cell of each zone, and the battery that this takes.
         ("way", np.int64, MOST_ZONES),
         ("spent", np.int64, MOST_ZONES),
