@@ -92,15 +92,14 @@ def _leaves_cell(mission, u, turn, chart):
     One that has just been overruled on its way to such a cell stays where it is: a teammate wants
     the same cell, and they would block each other. So does one whose battery is nearly empty.
     """
-    if u.zone < 0 or turn.zone < 0:
+    if u.zone < 0 or keeps_cell(mission, u):
         return False
-    if turn.cell < 0:
+    if turn.cell < 0 or u.zone != turn.zone:
         return u.zone != turn.zone
     x, y = chart.parking[turn.cell, 0], chart.parking[turn.cell, 1]
     cells = distance(chart, u.x, u.y, x, y)
     kept = waiting_slot(mission) * (cells * u.slots_per_cell + 1 + KEPT)
-    moves_on = cells > 0 and not u.overruled and usable_battery(mission, u) > kept
-    return u.zone != turn.zone or moves_on
+    return cells > 0 and not u.overruled and usable_battery(mission, u) > kept
 
 
 @inlined

@@ -17,7 +17,7 @@ spent. The first case that applies tells the safe actions:
 | 3. is in time, was overruled, and has nearest that are empty | these |
 | 4. is late, and has nearest that are clear | these; nearer to a zone in wind or to small zones |
 | 5. was overruled, and has nearest that are clear | these |
-| 6. is late, and has others that are clear and in time | these: they let the teammate pass |
+| 6. is late, and has others that are clear and in time | ``aside``: they let the teammate pass |
 | 7. was overruled, and is late or may hover | hovering, as two that insist block each other |
 | 8. is in time where teammates are near | the nearest, without those that hinder who must charge |
 | 9. any other | the nearest |
@@ -40,7 +40,7 @@ from dess.model.guard.battery import (
     will_charge,
 )
 from dess.model.guard.parking import HOME, parking_cell, parking_memory, stays, write_home
-from dess.model.guard.queues import waits_in_zone
+from dess.model.guard.queues import forget_plan, waits_in_zone
 from dess.model.guard.ways import (
     battery_around,
     battery_of_way,
@@ -48,6 +48,7 @@ from dess.model.guard.ways import (
     is_late,
     is_parked,
     is_tight,
+    may_stand,
 )
 from dess.model.rules import data_left
 from dess.model.state import HOVER, STEP_X, STEP_Y
@@ -62,14 +63,15 @@ _MOST_BATTERY = 2**40  # more than any way costs
 
 
 @inlined
-def _keeps_others_out(mission, uavs, j, sizes, turns):
-    """Whether UAV ``j`` is parked, and is not about to leave its cell for a teammate.
+def _stands(mission, uavs, j, sizes, turns):
+    """Whether UAV ``j`` keeps teammates out of its cell.
 
-    The plan of a mission that ends on the ground tells this. A teammate flies into the cell that is
-    left: around it, both might come to each other's way again and again.
+    Where there is a plan, it tells who is about to leave its cell. A teammate flies into the cell
+    that is left: around it, both might come to each other's way again and again.
     """
-    leaves = turns is not None and lands(mission) and turns[j].leaves
-    return is_parked(mission, uavs[j], sizes) and not leaves
+    if turns is None:
+        return is_parked(mission, uavs[j], sizes)
+    return may_stand(mission, uavs[j]) and not turns[j].leaves
 
 
 @inlined
@@ -90,7 +92,7 @@ def contests(mission, uavs, i, sizes, turns):
         east, south = o.x - u.x, o.y - u.y
         if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
-        parked = _keeps_others_out(mission, uavs, j, sizes, turns)
+        parked = _stands(mission, uavs, j, sizes, turns)
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -126,7 +128,7 @@ def _ceded(mission, uavs, i, sizes, turns):
             continue
         if not o.latch or not will_charge(mission, o):
             continue
-        if _keeps_others_out(mission, uavs, j, sizes, turns):
+        if _stands(mission, uavs, j, sizes, turns):
             continue
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -188,6 +190,8 @@ class Moves(NamedTuple):
         in_time: Those after which it is reached if the margin and the slots for a pad are spent.
         clear: Those that no teammate with the right of way contests.
         empty: Those that no teammate contests.
+        aside: Those that are clear and in time. Where missions end on the ground, those of them
+            with the least delay: hovering takes one slot, a move to the side and back takes two.
         lacking: The battery that lacks after the nearest [% / 1000].
     """
 
@@ -195,6 +199,7 @@ class Moves(NamedTuple):
     in_time: int
     clear: int
     empty: int
+    aside: int
     lacking: int
 
 
@@ -217,7 +222,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     """
     u = uavs[i]
     turns = memory.plan.turns
-    parked = _keeps_others_out(mission, uavs, i, chart.sizes, turns)
+    parked = _stands(mission, uavs, i, chart.sizes, turns)
     if charge and _keeps_its_place(mission, u, parked):
         return 1 << HOVER
     levels = contests(mission, uavs, i, chart.sizes, turns)
@@ -231,7 +236,8 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
     if charge and moves.lacking == 0 and lands(mission):
         nearest = moves.nearest & ~_into_cells_of_others(mission, uavs, i, chart, memory)
         nearest = nearest or moves.nearest
-        moves = Moves(nearest, moves.in_time, moves.clear, moves.empty, moves.lacking)
+        in_time, clear, empty, aside = moves.in_time, moves.clear, moves.empty, moves.aside
+        moves = Moves(nearest, in_time, clear, empty, aside, moves.lacking)
     return _choose_moves(mission, uavs, i, chart, turns, moves, levels)
 
 
@@ -245,8 +251,9 @@ def _keeps_its_place(mission, u, parked):
 def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach):
     """The ``Moves`` of UAV ``i``; ``contested`` are the levels of its actions."""
     u = uavs[i]
-    nearest = in_time = clear = empty = 0
+    nearest = in_time = clear = empty = aside = 0
     least = _MOST_BATTERY  # the battery that lacks on the way to the parking cell
+    least_aside = _MOST_BATTERY
     fewest = _MOST_BATTERY  # the battery that a move and the way from there need
     reserve = margin(mission, u) + waiting_slot(mission) * home.wait if charge else 0
     searches = charge and not is_calm(reach)
@@ -279,11 +286,16 @@ def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach
             clear |= bit
         if late <= reserve:
             in_time |= bit
+            delay = late if lands(mission) else 0
+            if level < 2 and delay < least_aside:
+                least_aside, aside = delay, 0
+            if level < 2 and delay == least_aside:
+                aside |= bit
         if late < least:
             least, nearest = late, 0
         if late == least:
             nearest |= bit
-    return Moves(nearest, in_time, clear, empty, least)
+    return Moves(nearest, in_time, clear, empty, aside, least)
 
 
 @inlined
@@ -328,8 +340,8 @@ def _choose_moves(mission, uavs, i, chart, turns, moves, levels):
         return _nearer_to_zone(chart, u, uncontested)
     if uncontested and (is_late or u.overruled):
         return uncontested
-    if is_late and moves.clear & moves.in_time:
-        return moves.clear & moves.in_time
+    if is_late and moves.aside:
+        return moves.aside
     if u.overruled and (is_late or moves.nearest >> HOVER & 1):
         return 1 << HOVER
     if not is_late and levels > 0:
@@ -504,6 +516,8 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
     home = stays(uavs[i])
     if charge or find_home:
         home = parking_cell(mission, uavs, i, data, chart, memory, reach)
+    else:
+        forget_plan(mission, memory.plan)
     return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory, reach)
 
 

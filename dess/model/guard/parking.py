@@ -11,6 +11,7 @@ from dess.model.guard.queues import (
     QUEUE,
     TURN,
     Plan,
+    forget_plan,
     is_given_up,
     may_wait,
     plan_pads,
@@ -21,6 +22,7 @@ from dess.model.guard.ways import (
     is_crowded,
     is_parked,
     is_tight,
+    may_stand,
     path_length,
 )
 from dess.model.ways import is_calm
@@ -121,9 +123,7 @@ def parking_cell(mission, uavs, i, data, chart, memory, reach):
         memory: ``parking_memory``.
         reach: ``Ways.reach``.
     """
-    for j in range(mission.uavs):
-        memory.plan.turns[j].zone = memory.plan.turns[j].cell = -1
-        memory.plan.turns[j].leaves = 0
+    forget_plan(mission, memory.plan)
     if mission.active == 1 and is_calm(reach) and mission.zones == 1 and mission.pad_rate == 0.0:
         memory.planned[:] = -1
         return _nearest(uavs[i], chart)
@@ -219,7 +219,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
     """
     u, taken, turns = uavs[i], memory.taken, memory.plan.turns
     are_matched = is_tight(mission, chart.sizes)
-    if are_matched and keeps_cell(mission, u):
+    if are_matched and _has_cell(mission, u, turns[i], chart, are_matched):
         memory.planned[:] = -1
         return stays(u)
     taken[:] = _FREE
@@ -228,7 +228,8 @@ def _choose(mission, uavs, i, chart, memory, reach):
         memory.planned[j] = -1
         if not o.active or o.zone < 0:
             continue
-        keeps = _has_cell(mission, o, chart, are_matched) or not is_crowded(mission, chart, o.zone)
+        keeps = _has_cell(mission, o, turns[j], chart, are_matched)
+        keeps = keeps or not is_crowded(mission, chart, o.zone)
         if not are_matched:
             keeps = keeps or j == i or waits_in_zone(mission, o)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
@@ -236,7 +237,7 @@ def _choose(mission, uavs, i, chart, memory, reach):
     for place in range(count):
         j = memory.order[place]
         o = uavs[j]
-        if j != i and (o.grounded or _has_cell(mission, o, chart, are_matched)):
+        if j != i and (o.grounded or _has_cell(mission, o, turns[j], chart, are_matched)):
             continue
         if j != i and are_matched and turns[j].zone < 0:
             continue  # it needs no cell
@@ -252,10 +253,10 @@ def _choose(mission, uavs, i, chart, memory, reach):
 
 
 @inlined
-def _has_cell(mission, u, chart, are_matched):
+def _has_cell(mission, u, turn, chart, are_matched):
     """Whether a UAV keeps its cell, and chooses none."""
     if are_matched:
-        return keeps_cell(mission, u)
+        return keeps_cell(mission, u) or (may_stand(mission, u) and not turn.leaves)
     return is_parked(mission, u, chart.sizes)
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
 from dess.model.guard.battery import must_charge
-from dess.model.guard.ways import battery_of_way
+from dess.model.guard.ways import battery_of_way, is_tight
 from dess.model.state import HOVER
 from dess.physics.charging import charge_limit, is_before, slots_to_charge
 from dess.physics.chart import distance
@@ -56,7 +56,8 @@ TURN = np.dtype(
         ("zone", np.int64),  # the zone where it will charge, -1 if it need not
         # The number of its cell in a full zone, else -1 (``dess.model.guard.matching``).
         ("cell", np.int64),
-        ("leaves", np.int64),  # whether it is in a zone, but matched to another cell (the same)
+        # Whether it may have to leave the zone cell where it is, in which all UAVs have no room.
+        ("leaves", np.int64),
         # The slots to the nearest cell of each zone, and the battery that this takes.
         ("way", np.int64, MOST_ZONES),
         ("spent", np.int64, MOST_ZONES),
@@ -96,6 +97,14 @@ class Plan(NamedTuple):
 def plan_memory(uavs: int) -> Plan:
     """Working memory for missions with so many UAVs."""
     return Plan(np.zeros(uavs, TURN), np.zeros(MOST_ZONES, QUEUE))
+
+
+@inlined
+def forget_plan(mission, plan):
+    """Let the plan tell nothing of any UAV."""
+    for j in range(mission.uavs):
+        plan.turns[j].zone = plan.turns[j].cell = -1
+        plan.turns[j].leaves = 0
 
 
 @inlined
@@ -177,6 +186,8 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
         else:
             find_ways(mission, u, turn, chart, reach)
     _choose_zones(mission, uavs, chart, plan)
+    for j in range(mission.uavs):
+        plan.turns[j].leaves = is_tight(mission, chart.sizes) and _may_leave(uavs[j], j, plan)
     zone = plan.turns[i].zone
     if zone < 0 or uavs[i].pad_request >= 0:
         return np.int64(0), np.int64(0), np.int64(0)
@@ -186,6 +197,14 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
     kept = max(min(kept, _slots_of_percent(mission, mission.charge_start) - 1), 0)
     gives_way = np.int64(_gives_way(mission, uavs, i, plan))
     return np.int64(kept), plan.turns[i].begins, gives_way
+
+
+@inlined
+def _may_leave(u, j, plan):
+    """Whether a UAV in a zone charges in another one, or in turn with UAVs that have no cell."""
+    if u.zone < 0 or u.charging or u.pad_request >= 0 or u.grounded:
+        return False
+    return u.zone != plan.turns[j].zone or plan.queues[u.zone].change > 0
 
 
 @inlined

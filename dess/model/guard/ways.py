@@ -16,20 +16,31 @@ CELLS_PER_UAV = 4
 
 
 @inlined
-def is_parked(mission, u, sizes):
-    """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded.
+def may_stand(mission, u):
+    """Whether a UAV keeps its cell unless a plan tells it to leave: it charges or is about to.
 
-    Where all UAVs together would fill a zone, one that has not yet asked for a pad may only fly
-    over it. In missions that end on the ground, a UAV also stands there shortly before the end, and
-    if it could not leave the zone (``cannot_leave``).
+    Or it is grounded. In missions that end on the ground, a UAV also stands shortly before the end,
+    and if it could not leave the zone (``cannot_leave``).
     """
     stays = u.charging or u.pad_request >= 0
     if not lands(mission):
-        stays = stays or (u.latch and not is_tight(mission, sizes))
+        stays = stays or u.latch
     else:  # there the latch is set whenever a UAV may charge
         stays = stays or u.battery <= mission.charge_start
         stays = stays or ends_soon(mission, u) or cannot_leave(mission, u)
     return u.active and (u.grounded or (stays and u.zone >= 0))
+
+
+@inlined
+def is_parked(mission, u, sizes):
+    """Whether a UAV blocks its cell, as far as its state tells.
+
+    Where all UAVs together would fill a zone, one in the air that has not yet asked for a pad may
+    only fly over it.
+    """
+    may_fly_over = not lands(mission) and is_tight(mission, sizes)
+    has_place = u.charging or u.pad_request >= 0 or u.grounded
+    return may_stand(mission, u) and (has_place or not may_fly_over)
 
 
 @inlined

@@ -13,6 +13,7 @@ from dess.model.state import END_NAMES, HOVER
 from tests import compiled
 from tests.dess.envs.episodes import placed
 from tests.dess.model.guard.test_guard import _mask
+from tests.drawn import EAST, NORTH
 
 # A strip of three rows with a zone of a cell for each UAV at its western end, and one of a single
 # cell at its eastern end. Missions end on the ground, and there are no margins but for teammates.
@@ -74,6 +75,27 @@ def test_who_comes_first_to_a_full_zone_flies_on_to_the_deeper_cell():
     assert _homes([first, second], **LANDING | {"zones": zones}) == [(23, 1), (22, 2)]
     charging = first | {"charging": True, "pad_request": 1}
     assert _homes([charging, second], **LANDING | {"zones": zones}) == [(22, 0), (23, 5)]
+
+
+def test_a_uav_flies_into_the_cell_that_a_teammate_is_told_to_leave():
+    """Both move on by one cell at once; if it flew around, they might do so again and again."""
+    sea = LANDING | {"zones": [{"cells": [22, 0, 2, 1], "pads": 1}], "charge_start": 20}
+    outside, inside = {"x": 23, "y": 1, "battery": 12}, {"x": 23, "y": 0, "battery": 14}
+    assert _homes([outside, inside], **sea) == [(23, 1), (22, 1)]
+    moves = _mask(outside, inside, **sea)
+    assert moves[0, NORTH] and not moves[1, HOVER]
+    waiting = inside | {"pad_request": 1}
+    assert not _mask(outside, waiting, **sea)[0, NORTH]
+
+
+def test_in_the_air_a_uav_at_c_s_keeps_its_cell_if_its_zone_has_one_for_all_that_come():
+    """One pad, three cells, and two UAVs that can ask alike: the first chooses another cell."""
+    sea = STRIP | {"zones": [{"cells": [23, 0, 1, 3], "pads": 1}], "charge_start": 20}
+    ready = {"y": 1, "battery": 14, "latch": True}
+    team = [ready | {"x": 22}, ready | {"x": 23}, {"x": 0, "y": 0, "battery": 60}]
+    assert _homes(team, **sea)[:2] == [(23, 2), (23, 0)]
+    moves = _mask(*team, **sea)
+    assert np.flatnonzero(moves[1]).tolist() == [HOVER] and not moves[0, EAST]
 
 
 def test_a_cell_that_parked_uavs_close_off_does_not_count():
