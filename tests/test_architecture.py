@@ -44,6 +44,8 @@ ROOMS = {
             "numbers",
             "names",
             "metrics",
+            "metric_ranges",
+            "measured",
             "facts",
             "sheet",
             "weather",
