@@ -7,7 +7,8 @@ import numpy as np
 
 from dess.analysis import numbers
 from dess.base.errors import listed
-from dess.model.channel import Link, efficiency, mean_snr_at
+from dess.model.channel import efficiency
+from dess.model.link import Link, mean_snr_at
 from dess.model.reach import Reach, reach_of_nodes
 from dess.model.state import ACTION_NAMES, constants_of
 from dess.physics.arrivals import MOST_MESSAGES

@@ -18,7 +18,14 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
-        *("model.state", "model.ways", "model.channel", "model.rules", "model.events"),
+        *(
+            "model.link",
+            "model.state",
+            "model.ways",
+            "model.channel",
+            "model.rules",
+            "model.events",
+        ),
         *(
             "model.record",
             "model.packets",

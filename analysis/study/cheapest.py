@@ -34,6 +34,8 @@ from dess.scenario.fields import is_number
 from dess.scenario.quantities import quantity_of
 from dess.scenario.scenario import ScenarioSpace
 
+# A round adds this share to the missions of each design point that needs more.
+GROWTH = 0.5
 # How much longer a search may take for which it is estimated: times its missions, and missions.
 FURTHER, MOST_FURTHER = 64, 10_000_000
 
@@ -287,6 +289,16 @@ class Cheapest(StrictTable):
             raise InputError("years", f"{years} is too few", "2 or more, for a selection")
         return self.model_copy(update={"first": years, "budget": years * points, "check": 0})
 
+    def for_pages(self) -> dict[str, float]:
+        """The rule as data for scripts, which spend the missions of a grid by it."""
+        return {
+            "first": self.first,
+            "growth": GROWTH,
+            "budget": self.budget,
+            "error": 1 - self.confidence,
+            "indifference": self.indifference,
+        }
+
     def shown(self, policies: int = 1) -> float:
         """The confidence that what was found to meet the requirements does, over all policies."""
         return 1 - policies * (1 - self.confidence) / 2
@@ -449,7 +461,7 @@ class _Search:
                     question.look(points, self._excess, self.rule.indifference)
             needed = sorted(set().union(*(question.needed for question in self.questions)))
             room = self.rule.budget - int(points.counts.sum())
-            steps = points.counts[needed] // 2
+            steps = (GROWTH * points.counts[needed]).astype(int)
             if steps.sum() > room:
                 steps = np.minimum(steps, room // len(needed))
             if not steps.any():

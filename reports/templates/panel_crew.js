@@ -123,7 +123,7 @@ class Crew {
         this.hasWorked = true;
         if (!this.job || answer.job !== this.number) return;
         this.job.take(answer);
-        this.give(member);
+        this.wake();
         this.changed();
     }
 }
