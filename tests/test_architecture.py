@@ -40,9 +40,10 @@ ROOMS = {
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
-        *("shipped", "network", "adapter", "heuristics", "planner", "learner.config"),
-        *("learner.policy", "learner.arrays", "learner.trained", "learner.network"),
-        "learner.training",
+        *("shipped", "network", "integers", "quantization", "adapter", "heuristics", "planner"),
+        *("learner.config", "learner.policy", "learner.arrays", "learner.trained"),
+        "learner.network",
+        *("learner.calibration", "learner.training"),
         *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
         "registry",
     ),
