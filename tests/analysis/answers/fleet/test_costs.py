@@ -10,7 +10,7 @@ from dess.analysis.answers.fleet.costs import (
     price_facts,
     priced_settings,
 )
-from dess.analysis.metrics import metric_in_missions
+from dess.analysis.metric_ranges import metric_in_missions
 from dess.analysis.stats.front import on_front
 from dess.analysis.stats.intervals import interval_of
 from dess.analysis.study.prices import Costs, most_battery_per_slot
