@@ -133,8 +133,6 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     is_choice = masks(states, rows, uavs).sum(1) > 1
     rows, uavs = rows[is_choice], uavs[is_choice]
     encoder = encoder_of("sets", space)
-    chart = encoder.sea.chart._replace(ways=None)  # it has those it needs
-    encoder.sea = encoder.sea._replace(chart=chart)
     return Examples(encoder, states, rows, uavs, labels[rows, uavs])
 
 

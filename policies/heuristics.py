@@ -14,7 +14,12 @@ from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import late_slots, margin, margin_slots, slots_needed, usable_battery
 from dess.model.guard.moves import contest, contests, guide_uav
 from dess.model.guard.parking import parking_memory
-from dess.model.guard.ways import path_length, round_trip, slots_of_round_trip
+from dess.model.guard.ways import (
+    is_beyond_battery,
+    path_length,
+    round_trip,
+    slots_of_round_trip,
+)
 from dess.model.rules import data_left, legal_moves
 from dess.model.state import HOVER, STEP_X, STEP_Y
 from dess.model.view import View
@@ -22,6 +27,7 @@ from dess.physics import streams
 from dess.physics.chart import Chart, distance, spread
 from dess.physics.energy import has_costs, waiting_slot
 from dess.physics.landing import flies
+from dess.physics.radio import has_limit
 
 # The numbers of the policies in compiled code.
 RANDOM, UNGUARDED, NEAREST, GREEDY, TOUR, AGE = range(6)
@@ -194,13 +200,9 @@ def choose_action(
     charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
     if kind == RANDOM:
         return choose_at_random(mission, team, i, safe, chart.sizes)
-    goal_x, goal_y = home.x, home.y
-    node = _choose_goal(
+    goal_x, goal_y = _choose_goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
     )
-    if node >= 0:
-        goal_x = np.int64(nodes[node, 0])
-        goal_y = np.int64(nodes[node, 1])
     return step_towards(mission, team, i, chart, safe, goal_x, goal_y)
 
 
@@ -228,7 +230,10 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
 def _choose_goal(
     kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
 ):  # fmt: skip
-    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
+    """The cell that UAV ``i`` flies to: that of the best node within its reach, or else its zone.
+
+    It flies as near as it can to a node whose cell is beyond its full battery.
+    """
     u = team[i]
     spare = slots_needed(mission, u)
     if charge:
@@ -236,7 +241,7 @@ def _choose_goal(
         spare -= waiting_slot(mission) * (1 + home.wait)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best = 0.0
-    node = -1
+    goal_x, goal_y = home.x, home.y
     for k in range(mission.nodes):
         if data[k] <= 0.0:
             continue
@@ -254,11 +259,14 @@ def _choose_goal(
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if score <= best:  # the weights below are at most 1
             continue
-        spent = slots
-        if charge:
-            spent = round_trip(mission, u, chart, x, y, home, reach)
-        if spent > spare or (charge and _is_too_late(mission, u, chart, x, y)):
+        if not charge and slots > spare:
             continue
+        if charge and not _is_within_reach(mission, u, chart, x, y, home, reach, spare):
+            if not has_limit(mission) or not is_beyond_battery(mission, u, chart, x, y, reach):
+                continue
+            x, y = _place_of_service(mission, chart, x, y)
+            if not _is_within_reach(mission, u, chart, x, y, home, reach, spare):
+                continue
         if kind == AGE:
             score = _score_by_age(mission, data, sensors, nodes, chart, k, slots)
         if kind in (GREEDY, AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
@@ -267,8 +275,26 @@ def _choose_goal(
             score *= 1e-3
         if score > best:
             best = score
-            node = k
-    return node
+            goal_x, goal_y = x, y
+    return goal_x, goal_y
+
+
+@inlined
+def _is_within_reach(mission, u, chart, x, y, home, reach, spare):
+    """Whether UAV ``u`` comes home from a cell in time, and with the battery that it may spend."""
+    if round_trip(mission, u, chart, x, y, home, reach) > spare:
+        return False
+    return not _is_too_late(mission, u, chart, x, y)
+
+
+@inlined
+def _place_of_service(mission, chart, x, y):
+    """The cell towards the nearest zone at which a node at a cell is still served."""
+    near = chart.parking[chart.nearest[y, x]]
+    east, south = near[0] - x, near[1] - y
+    length = math.sqrt(np.float64(east * east + south * south))
+    share = min(mission.service_cells / length, 1.0)
+    return x + np.int64(share * east), y + np.int64(share * south)
 
 
 @inlined

@@ -18,7 +18,14 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "dess": (
         *("base", "physics", "scenario"),
-        *("model.state", "model.ways", "model.channel", "model.rules", "model.events"),
+        *(
+            "model.link",
+            "model.state",
+            "model.ways",
+            "model.channel",
+            "model.rules",
+            "model.events",
+        ),
         *(
             "model.record",
             "model.packets",
@@ -33,9 +40,10 @@ ROOMS = {
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
-        *("shipped", "network", "adapter", "heuristics", "planner", "learner.config"),
-        *("learner.policy", "learner.arrays", "learner.trained", "learner.network"),
-        "learner.training",
+        *("shipped", "network", "integers", "quantization", "adapter", "heuristics", "planner"),
+        *("learner.config", "learner.policy", "learner.arrays", "learner.trained"),
+        "learner.network",
+        *("learner.calibration", "learner.training"),
         *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
         "registry",
     ),
@@ -44,6 +52,8 @@ ROOMS = {
             "numbers",
             "names",
             "metrics",
+            "metric_ranges",
+            "measured",
             "facts",
             "sheet",
             "weather",
@@ -57,7 +67,7 @@ ROOMS = {
         *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),
     "reports": (
-        *("pages", "player", "explorer", "crate"),
+        *("pages", "player", "crate"),
         *("interrupts", "cli"),
     ),
 }

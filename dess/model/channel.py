@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.base.elementary import exp, hypot, log1p, log10
+from dess.base.elementary import exp, log1p
 from dess.base.kernels import inlined, kernel, shared_kernel
+from dess.model.link import Link, mean_snr_at
 from dess.model.state import STEP_X, STEP_Y
 from dess.physics import fleet, streams
 from dess.physics.chart import Cell, Chart, chart_at, read_only
@@ -39,35 +40,6 @@ BATCH = np.dtype(
         ("rest", np.float64),  # highest mean SNR in the slot of all nodes behind these [dB]
     ]
 )
-
-
-class Link(NamedTuple):
-    """The link budget: all on which the mean SNR at a distance depends.
-
-    Attributes:
-        edge_snr: The mean SNR at ``snr_distance`` [dB].
-        snr_distance: The distance at which it holds [m].
-        path_loss_exponent: The exponent of the path loss.
-        altitude: The altitude of the UAVs [m].
-        range: The distance beyond which there is no service [m], 0 for none.
-    """
-
-    edge_snr: float
-    snr_distance: float
-    path_loss_exponent: float
-    altitude: float
-    range: float
-
-    @classmethod
-    def of(cls, scenario: Fields) -> "Link":
-        """The link budget of a scenario."""
-        return cls(
-            scenario.edge_snr,
-            scenario.snr_distance,
-            scenario.path_loss_exponent,
-            scenario.altitude,
-            scenario.radio.range,
-        )
 
 
 class Site(NamedTuple):
@@ -217,14 +189,6 @@ def make_world(site: Site) -> World:
         squares = coarse * coarse + fine * fine
         mean_snr[row] = mean_snr_at(site.link, site.cell_size * (np.sqrt(squares) / places))
     return World.of(np.array(site.nodes, np.int64), mean_snr, chart, steps, m)
-
-
-def mean_snr_at(link: Link, horizontal: np.ndarray) -> np.ndarray:
-    """The mean SNR [dB] at horizontal distances [m], minus infinity out of range (eq. 10)."""
-    distance = hypot(horizontal, link.altitude)
-    loss = 10 * link.path_loss_exponent * log10(distance / link.snr_distance)
-    reach = link.range or math.inf
-    return np.where(distance <= reach, link.edge_snr - loss, -math.inf)
 
 
 @shared_kernel

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.model.channel import Link, mean_snr_at
 from dess.model.guard.battery import margin
+from dess.model.link import Link, least_snr, mean_snr_at
 from dess.model.state import constants_of, types_of
 from dess.model.ways import FAR as WAYS_FAR
 from dess.model.ways import move_costs
@@ -124,10 +124,7 @@ def _window(about: np.ndarray, node: Cell) -> np.ndarray:
 
 def _in_range_about(space: ScenarioSpace) -> np.ndarray:
     """(2 H - 1, 2 W - 1) whether a node is in range, by where the UAV is about it."""
-    least = -math.inf
-    if space.radio.steps:
-        least = space.radio.steps[0][0]
-    return _in_range_of(Link.of(space), space.cell_size, space.size, least)
+    return _in_range_of(Link.of(space), space.cell_size, space.size, least_snr(space))
 
 
 @lru_cache(maxsize=8)

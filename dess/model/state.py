@@ -15,6 +15,7 @@ from numpy.lib.recfunctions import repack_fields
 
 from dess.base.errors import InputError, check_type
 from dess.base.kernels import kernel
+from dess.model.link import service_cells
 from dess.physics import fleet, streams
 from dess.physics.energy import ACTIONS, ENERGY, SPEEDS, energy_constants
 from dess.physics.failures import MOST_PADS
@@ -70,6 +71,7 @@ MISSION = np.dtype(
         # Radio (dess.physics.radio): range [m], largest efficiency [bit/s/Hz], both 0 for none, and
         # the steps of the rate: from which SNR [dB] on the efficiency is which.
         *fields(np.float64, "range max_rate"),
+        ("service_cells", np.int64),  # how far nodes are served by their mean SNR [cells]
         ("steps", np.int64),
         ("step_snr", np.float64, MOST_STEPS),
         ("step_rate", np.float64, MOST_STEPS),
@@ -264,6 +266,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         "age_reward": scenario.age.reward,
         **({"arrival_rate": fmean(scenario.node_rates)} if own_rates else {}),
         **scenario.radio.constants(),
+        "service_cells": service_cells(scenario),
         **energy_constants(
             scenario.consumption, scenario.wind, scenario.size, fleet.slowest(scenario.fleet)
         ),

@@ -5,7 +5,7 @@ view.own["battery"], view.residual, view.legal
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,11 @@ class View:
         Args:
             kind: The type of the part (``mission_part``).
         """
+        missions = self.state.missions.view(np.uint8).reshape(len(self.state.missions), -1)
+        columns = _columns_of(self.state.missions.dtype, kind)
+        if _are_equal(missions, columns):
+            yield missions[0, columns].tobytes(), np.arange(len(self))
+            return
         parts = part_of(self.state.missions, kind).view(np.dtype((np.void, kind.itemsize)))
         numbers: dict[bytes, int] = {}
         of_mission = np.array([numbers.setdefault(part, len(numbers)) for part in parts.tolist()])
@@ -119,6 +124,24 @@ class View:
         """(R, 5) mask of the legal actions: Hover, and the moves that stay on the open grid."""
         zones = self.world.chart.zones
         return legal_actions(self.state.uavs, zones, self.mission, self.uav)
+
+
+@lru_cache
+def _columns_of(missions: np.dtype, part: np.dtype) -> np.ndarray:
+    """The numbers of the bytes of records that a part of them has."""
+    assert missions.fields and part.names
+    places = [missions.fields[name][:2] for name in part.names]
+    return np.concatenate([at + np.arange(kind.itemsize) for kind, at in places])
+
+
+@kernel
+def _are_equal(records, columns):
+    """Whether some columns of all (B, bytes) records are equal."""
+    for b in range(1, len(records)):
+        for column in columns:
+            if records[b, column] != records[0, column]:
+                return False
+    return True
 
 
 @kernel

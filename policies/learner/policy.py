@@ -6,17 +6,69 @@ from typing import Any
 import numpy as np
 
 from dess.base.errors import InputError
-from dess.envs.observations.sets import SEA_PART, sea_of
-from dess.envs.observations.states import Layout, compact_states, masks
+from dess.envs.observations.sets import SEA_PART, Sets, sea_of
+from dess.envs.observations.states import CompactStates, Layout, compact_states, masks
 from dess.model.channel import World
 from dess.model.view import View
+from dess.policies.integers import Integers, decide
 from dess.policies.network import Weights
 
-# The rounding errors of a network depend on the number of rows that it evaluates together and on
-# the processor, but the action must not. So if the two best values differ by less than a share
-# CLOSE of the best one (and of 1), fifteen times the largest error seen, the values are computed
-# again in double precision and rounded to DECIMALS.
+# The rounding errors of a network in floats depend on the number of rows that it evaluates together
+# and on the processor, but the action must not. So if the two best values differ by less than a
+# share CLOSE of the best one (and of 1), fifteen times the largest error seen, the values are
+# computed again in double precision and rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-5, 9
+
+
+class IntegerNetwork:
+    """A network of sets in integers, with which a policy acts."""
+
+    def __init__(self, integers: Integers) -> None:
+        self._integers = integers
+
+    def choose_actions(
+        self, encoder: Sets, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+    ) -> np.ndarray:
+        """The (R,) allowed actions with the highest values, as ``FloatNetwork``."""
+        actions = np.empty(len(missions), np.int64)
+        decide(states, missions, uavs, encoder.sea, encoder.tables, self._integers, actions)
+        return actions
+
+
+class FloatNetwork:
+    """A network in floats, with which a policy acts."""
+
+    def __init__(self, network: Any, weights: Weights) -> None:
+        """Make it of one of the networks of ``dess.policies.network``, with its weights."""
+        self._network, self._exact = (network(weights, t) for t in (np.float32, np.float64))
+
+    def choose_actions(
+        self, encoder: Any, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+    ) -> np.ndarray:
+        """The (R,) allowed actions with the highest values.
+
+        Args:
+            encoder: The encoder of the sea.
+            states: The states of the missions.
+            missions, uavs: (R,) the state and the index of each UAV.
+        """
+        actions = np.empty(len(missions), np.int64)
+        for first in range(0, len(missions), self._network.rows):
+            rows = slice(first, first + self._network.rows)
+            parts = encoder.encode(states, missions[rows], uavs[rows])
+            allowed = masks(states, missions[rows], uavs[rows])
+            actions[rows] = self._best_actions(parts, allowed)
+        return actions
+
+    def _best_actions(self, parts: tuple[np.ndarray, ...], allowed: np.ndarray) -> np.ndarray:
+        """The (R,) allowed actions with the highest values."""
+        values = np.where(allowed, self._network(*parts).astype(np.float64), -np.inf)
+        second, best = np.partition(values, -2)[:, -2:].T
+        close = best - second < CLOSE * (1 + np.abs(best))
+        if close.any():
+            exact = self._exact(*(part[close].astype(np.float64) for part in parts))
+            values[close] = np.where(allowed[close], exact.round(DECIMALS), -np.inf)
+        return values.argmax(1)
 
 
 class LearnedPolicy:
@@ -37,20 +89,14 @@ class LearnedPolicy:
     learner = ""
 
     def __init__(
-        self,
-        name: str,
-        observation: Any,
-        network: Any,
-        weights: Weights,
-        guarded: bool,
-        layout: Layout | None,
+        self, name: str, observation: Any, network: Any, guarded: bool, layout: Layout | None
     ):
-        """Make the policy of one of the networks of ``dess.policies.network``, with its weights."""
+        """Make the policy of a network: ``IntegerNetwork`` or ``FloatNetwork``."""
         self.name = name
         self.observation = observation
         self.guarded = guarded
         self.layout = layout
-        self._network, self._exact = (network(weights, t) for t in (np.float32, np.float64))
+        self._network = network
         self._world: World | None = None  # that of the last missions
         self._encoders: dict[bytes, Any] = {}  # of its seas, by what an encoder reads of them
 
@@ -62,26 +108,13 @@ class LearnedPolicy:
                 training.
         """
         states = compact_states(view.state, view.world.chart, self.guarded, view.ways)
-        allowed = masks(states, view.mission, view.uav)
         actions = np.empty(len(view), np.int64)
-        for of_sea, encoder in self._rows_by_sea(view):
-            for first in range(0, len(of_sea), self._network.rows):
-                rows = of_sea[first : first + self._network.rows]
-                parts = encoder.encode(states, view.mission[rows], view.uav[rows])
-                actions[rows] = self._best_actions(parts, allowed[rows])
+        for rows, encoder in self.rows_by_sea(view):
+            of_sea = view.mission[rows], view.uav[rows]
+            actions[rows] = self._network.choose_actions(encoder, states, *of_sea)
         return actions
 
-    def _best_actions(self, parts: tuple[np.ndarray, ...], allowed: np.ndarray) -> np.ndarray:
-        """The (R,) allowed actions with the highest values."""
-        values = np.where(allowed, self._network(*parts).astype(np.float64), -np.inf)
-        second, best = np.partition(values, -2)[:, -2:].T
-        close = best - second < CLOSE * (1 + np.abs(best))
-        if close.any():
-            exact = self._exact(*(part[close].astype(np.float64) for part in parts))
-            values[close] = np.where(allowed[close], exact.round(DECIMALS), -np.inf)
-        return values.argmax(1)
-
-    def _rows_by_sea(self, view: View) -> Iterator[tuple[np.ndarray, Any]]:
+    def rows_by_sea(self, view: View) -> Iterator[tuple[np.ndarray, Any]]:
         """The rows of a view sea by sea, with the encoder of the sea."""
         if self.layout is not None:
             if self._world is not view.world:

@@ -29,11 +29,19 @@ from dess.envs.observations.observer import encoder_of
 from dess.model.batch import BATCH_SIZE
 from dess.model.record import MISSION_RECORD
 from dess.model.state import MISSION, UAV
+from dess.policies.learner.calibration import calibrate
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
 from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
 from dess.policies.learner.dqn import ReplayMemory
 from dess.policies.learner.network import count_units, make_network, to_arrays
-from dess.policies.learner.trained import make_observation, read_weights, save_policy
+from dess.policies.learner.trained import (
+    has_integers,
+    load_teacher,
+    make_observation,
+    read_weights,
+    save_integers,
+    save_policy,
+)
 from dess.policies.learner.training import Training
 from dess.scenario.scenario import ScenarioSpace
 
@@ -245,6 +253,8 @@ def _run_training(
         save_training(out / CHECKPOINT, training)
     if results_tick != training.tick:
         _save_results(out, training)
+    if training.done and has_integers(training.config):
+        save_integers(out, calibrate(*load_teacher(out)))
 
 
 def _is_evaluation_due(training: Training) -> bool:

@@ -1,6 +1,8 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
-``config.json`` describes the weights (``dess.policies.learner.config``) and has their checksum.
+``config.json`` describes the weights (``dess.policies.learner.config``) and has their checksum. A
+policy for any sea acts with ``integers.safetensors``, which was made of weights with the checksum
+that it has (``dess.policies.learner.calibration``).
 """
 
 import copy
@@ -13,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
@@ -24,12 +27,14 @@ from dess.envs.observations.sets import Sets
 from dess.envs.observations.states import Layout, layout_of
 from dess.envs.observations.vector import Vector
 from dess.policies import network
+from dess.policies.integers import HIDDEN, Integers, check_integers, integer_forms
 from dess.policies.learner.arrays import (
     Arrays,
     array_without_memory,
     describe_damage,
     hash_arrays,
     make_contiguous,
+    require_same_forms,
     require_weights,
 )
 from dess.policies.learner.config import (
@@ -46,10 +51,12 @@ from dess.policies.learner.config import (
     read_description,
     resume_command,
 )
-from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.learner.policy import FloatNetwork, IntegerNetwork, LearnedPolicy
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 
+INTEGERS = "integers.safetensors"
+_MODEL_SUM = "model_sha256"  # the array with the checksum of the weights that integers are made of
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
 # The encoder and the network of each kind of observation.
@@ -91,9 +98,9 @@ def expected_weights(config: TrainingConfig, observation: Any) -> Arrays:
 def make_policy(
     config: TrainingConfig, layout: Layout | None, observation: Any, weights: Weights
 ) -> LearnedPolicy:
-    """The policy of a config with these weights."""
-    acting = _KINDS[config.observation][1]
-    return LearnedPolicy(config.name, observation, acting, weights, config.guard, layout)
+    """The policy of a config that acts with these float weights."""
+    acting = FloatNetwork(_KINDS[config.observation][1], weights)
+    return LearnedPolicy(config.name, observation, acting, config.guard, layout)
 
 
 def save_policy(
@@ -154,7 +161,61 @@ def load_policy(folder: Path) -> LearnedPolicy:
         InputError: If a file is missing, damaged, of another version or of another shape.
     """
     content, description = _read_folder(folder)
-    return copy.copy(_make_cached_policy(folder, content, description.model_dump_json()))
+    integers = b""
+    with suppress(Missing):
+        integers = read_bytes(folder / INTEGERS, MODEL_LIMIT)
+    described = description.model_dump_json()
+    return copy.copy(_make_cached_policy(folder, content, described, integers))
+
+
+def load_teacher(folder: Path) -> tuple[LearnedPolicy, Arrays, TrainingConfig]:
+    """A trained policy that acts with its float weights, the weights, and its config.
+
+    Raises:
+        InputError: As ``load_policy``.
+    """
+    content, description = _read_folder(folder)
+    described = description.model_dump_json()
+    policy = copy.copy(_make_cached_policy(folder, content, described, b""))
+    return policy, _parse_weights(content, folder / MODEL), description.training
+
+
+def has_integers(config: TrainingConfig) -> bool:
+    """Whether a policy of a config can act in integers: on any sea, with the compiled widths."""
+    return config.algorithm == "ppo" and tuple(config.hidden) == HIDDEN
+
+
+def save_integers(folder: Path, integers: Integers) -> None:
+    """Write the integers of the weights that a folder has.
+
+    Raises:
+        InputError: If the file cannot be written.
+    """
+    arrays = integers._asdict() | {_MODEL_SUM: _sum_of(read_bytes(folder / MODEL, MODEL_LIMIT))}
+    write_file(folder / INTEGERS, save(make_contiguous(arrays)))
+
+
+def _parse_integers(content: bytes, model: bytes, path: Path) -> Integers | None:
+    """The integers in the content of a file; None if they were made of other weights.
+
+    Raises:
+        InputError: If they are damaged.
+    """
+    try:
+        arrays = load(content)
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise describe_damage(path, error) from None
+    require_same_forms(arrays, integer_forms() | {_MODEL_SUM: _sum_of(model)}, str(path))
+    if not np.array_equal(arrays.pop(_MODEL_SUM), _sum_of(model)):
+        return None
+    integers = Integers(**arrays)
+    check_integers(integers, path)
+    return integers
+
+
+def _sum_of(model: bytes) -> np.ndarray:
+    """The checksum of a file of weights, as an array."""
+    return np.frombuffer(hashlib.sha256(model).digest(), np.uint8)
 
 
 def read_weights(folder: Path) -> Arrays:
@@ -182,7 +243,7 @@ def _read_folder(folder: Path) -> tuple[bytes, Description]:
 
 
 @lru_cache(maxsize=4)
-def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolicy:
+def _make_cached_policy(folder: Path, content: bytes, text: str, integers: bytes) -> LearnedPolicy:
     """The policy of these weights and their description; every process loads one many times."""
     path = folder / MODEL
     where = folder / CONFIG
@@ -196,9 +257,18 @@ def _make_cached_policy(folder: Path, content: bytes, text: str) -> LearnedPolic
     require_version(description.observation_version, observation, where)
     weights = _parse_weights(content, path)
     require_weights(weights, expected_weights(config, observation), str(path))
-    policy = make_policy(config, layout, observation, weights)
+    parsed = None
+    if integers and has_integers(config):
+        parsed = _parse_integers(integers, content, folder / INTEGERS)
+    if parsed:
+        acting = parsed._asdict()
+        chosen = IntegerNetwork(parsed)
+        policy = LearnedPolicy(config.name, observation, chosen, config.guard, layout)
+    else:
+        acting = weights
+        policy = make_policy(config, layout, observation, weights)
     policy.learner = learner_identifier(config)
-    policy.weights = hash_arrays([config.observation, config.guard, values], weights)
+    policy.weights = hash_arrays([config.observation, config.guard, values], acting)
     ticks = description.run.ticks
     if ticks is not None and ticks < config.ticks:
         name = config.name

@@ -19,12 +19,7 @@ from markupsafe import Markup
 from dess import InputError
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
-from dess.analysis.metrics import (
-    NODES_BEHIND,
-    PRODUCT,
-    choose_units,
-    metric_of,
-)
+from dess.analysis.metrics import NODES_BEHIND, PRODUCT, choose_units, metric_of
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS
@@ -150,7 +145,6 @@ class Panel(Document):
             "prices": [*describe_prices(self.costs)],
             "priced": [*other_prices(self.costs)],
             "grid": self._grid(settings),
-            "indifference": self.search.indifference if self.search else 0.0,
             "sea": _describe_sea(baseline, fleet),
             "product": METRICS.index(PRODUCT),
             "scenario": self.scenario,
@@ -186,7 +180,7 @@ class Panel(Document):
         answer = f"The answer of the page is {self.search.fleet} with {self.search.policy}"
         if self.search.policy == self.policy:
             return (
-                f"{answer}. The grid has the same requirements and tolerance, but intervals that "
+                f"{answer}. The grid has the same missions and the same rule, but intervals that "
                 "hold however often you look, which are wider; where it leaves open what the page "
                 "has decided, the page is the evidence."
             )
@@ -202,9 +196,9 @@ class Panel(Document):
             return None
         return value_of(baseline, key)
 
-    def _grid(self, settings: Mapping[str, Sequence[Any]]) -> dict[str, list[int]] | None:
-        """The positions of the fleets of the buyer's grid: those of a search with prices."""
-        if not self.requirements or self.costs is None or not {*COUNTS} <= {*settings}:
+    def _grid(self, settings: Mapping[str, Sequence[Any]]) -> dict[str, Any] | None:
+        """The positions of the fleets of the buyer's grid, and the rule of its search."""
+        if not self.requirements or self.search is None or not {*COUNTS} <= {*settings}:
             return None
         positions = {}
         for key in COUNTS:
@@ -214,7 +208,7 @@ class Panel(Document):
                 return None
             numbers = [numbers[place * (len(numbers) - 1) // (_SIDE - 1)] for place in range(_SIDE)]
             positions[key] = sorted({settings[key].index(number) for number in numbers})
-        return positions
+        return {**positions, "rule": self.search.rule.for_pages()}
 
 
 def make_panel(

@@ -4,13 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from dess.analysis.metrics import (
-    AGE,
-    PRODUCT,
-    RATIO,
-    SUCCESS,
-    metric_of,
-)
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES
@@ -43,14 +37,12 @@ class Search(Document):
     Attributes:
         policy: The policy of its answer.
         fleet: The fleet of its answer, in words; empty if there is none.
-        tolerance: How far from a requirement either verdict is right, as a share.
-        indifference: The least saving that matters, in the currency.
+        rule: The rule by which the search spends its missions, and the grid too.
     """
 
     policy: str
     fleet: str
-    tolerance: float
-    indifference: float
+    rule: Cheapest
 
 
 def describe_prices(costs: Costs | None) -> Iterator[dict[str, Any]]:
@@ -93,7 +85,7 @@ def describe_metrics(
     """What the panel writes of each metric, by its column in the values of missions."""
     tolerance = Cheapest.model_fields["tolerance"].default
     if search is not None:
-        tolerance = search.tolerance
+        tolerance = search.rule.tolerance
     offered = {*METRICS[: METRICS.index("reward")], *measures_of(space)}
     if costs is not None:
         offered.add("cost")

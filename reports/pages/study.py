@@ -253,8 +253,7 @@ def make_panel_of(results: Results, metric: str | None = None) -> HTML | Markdow
         shown_search = Search(
             policy=policy,
             fleet=fleet,
-            tolerance=rule.tolerance,
-            indifference=rule.indifference,
+            rule=rule,
         )
     space = results.scenario(point)
     name = manifest.points[point].values.get(SEA, results.study.scenario)

@@ -6,7 +6,7 @@
 const NARROW = "(max-width: 40rem)"; // where settings are folded at first
 const SIDES = ["a", "b"];
 const [controlsA, controlsB] = SIDES.map((side) => new Controls(root, side, data.settings)), prices = new Prices(root, data.prices, data.priced);
-const missions = named("missions"), gridMissions = named("grid-missions");
+const missions = named("missions");
 const required = [...root.querySelectorAll("[data-panel=requirement]")].map((line, n) =>
     ({line, metric: named(`require-${n}`), bound: named(`bound-${n}`), slider: named(`slide-${n}`)}));
 /** @type {(key: string) => Metric | undefined} */
@@ -136,18 +136,19 @@ function sweepCommand() {
 function fill() {
     stop();
     tidy();
-    gridMissions.value = wholeNumber(gridMissions);
     if (keyOfGrid() !== gridKey) {
-        const required = requirements(), choices = choicesOfGrid(), error = GRID_ERROR / choices.length / required.length;
+        const required = requirements(), choices = choicesOfGrid(), {rule} = data.grid;
+        const error = rule.error / choices.length / (required.length + 1); // an interval of each, and of the cost
         const heads = find("grid").tHead.rows[0].cells;
         const cells = choices.map(({place, choice}) => {
             const name = `${heads[place.cellIndex].textContent}, ${place.parentElement.cells[0].textContent}`;
-            return {name, place, track: new Track(crew.simulator, name, choice, prices.amounts, error)};
+            return {name, place, track: new Track(crew.simulator, name, choice, prices.amounts, error), wanted: rule.first};
         });
-        grid = new Grid(cells, required, metricOf("cost"), data.indifference);
+        grid = new Grid(cells, required, metricOf("cost"), rule);
         gridKey = keyOfGrid();
     }
-    grid.extend(Math.min(grid.count + wholeNumber(gridMissions), Number(gridMissions.max)));
+    grid.requirements = requirements();
+    grid.resume();
     crew.begin(grid);
     show();
 }
@@ -160,12 +161,15 @@ function showGrid() {
     find("grid").classList.toggle("stale", grid !== null && isNew);
     find("grid-status").textContent = !isAsked ? "Choose what is required."
         : grid && isNew ? "The grid is of the settings before: press Fill the grid." : "";
+    find("grid-bar").hidden = !isAsked || !grid || isNew;
     if (!isAsked || !grid || isNew) return;
     grid.requirements = requirements();
     gridCommand = sweepCommand();
     find("fill-command").textContent = gridCommand;
-    if (isRunning) crew.wake(); // a bound that has moved may have opened a cell
-    find("grid-status").textContent = `${grid.inWords()} ${grouped(grid.count)} missions${isRunning ? ", running" : ""}.`;
+    find("grid-bar").value = grid.count / (grid.count + grid.missing) || 0;
+    const open = isRunning ? "" : grid.openInWords();
+    const sentences = [grid.inWords(), open, `${grouped(grid.count)} missions${isRunning ? ", running" : ""}.`];
+    find("grid-status").textContent = sentences.filter(Boolean).join(" ");
     grid.show();
 }
 
@@ -354,7 +358,6 @@ openPanel((simulator) => {
     document.querySelectorAll("[data-replaced-by=panel]").forEach((element) => element.classList.add("replaced"));
     root.addEventListener("input", stop);
     required.forEach(({line}) => line.addEventListener("input", require));
-    gridMissions?.addEventListener("input", (event) => event.stopPropagation());
     const actions = {
         reset, run: start, stop, dots: pick, fill, "fill-stop": stop,
         same: () => { controlsB.choice = controlsA.choice; stop(); },

@@ -1,54 +1,53 @@
 // The buyer's grid: fleets of UAVs and charging pads, and which of them are known to meet
-// requirements. Its intervals hold together and for any bounds, so that these may be moved.
+// requirements. It spends missions as the search of its page does, whose rule it has as data. Its
+// intervals hold together and for any bounds, so that these may be moved.
 
 /**
- * A fleet in words, where the table has it, and its missions.
- * @typedef { {name: string, place: HTMLElement, track: Track}} Cell
+ * A fleet in words, where the table has it, its missions, and how many it needs so far.
+ * @typedef { {name: string, place: HTMLElement, track: Track, wanted: number}} Cell
  */
 
-const GRID_ERROR = 0.05; // the probability that an interval of any cell fails
-const BLOCK = 50; // missions of a cell before it is another one's turn
-const FEWEST = 30; // missions of a cell, with which its cost has an interval
+/**
+ * How a search spends its missions (`Cheapest.for_pages`).
+ * @typedef {object} SearchRule
+ * @property {number} first - the missions of every cell in the first round
+ * @property {number} growth - the share that a round adds to the missions of the cells that are needed
+ * @property {number} budget - the most missions in all
+ * @property {number} error - the probability that an interval of any cell fails
+ * @property {number} indifference - the least saving that matters
+ */
+
+const MOST_NAMED = 4; // of the cells that are open
 
 class Grid {
     /**
      * @param {Cell[]} cells
      * @param {Requirement[]} requirements
      * @param {Metric} cost
-     * @param {number} indifference - the least saving that matters
+     * @param {SearchRule} rule
      */
-    constructor(cells, requirements, cost, indifference) {
+    constructor(cells, requirements, cost, rule) {
         this.cells = cells;
         this.requirements = requirements;
         this.cost = cost;
-        this.indifference = indifference;
-        this.isOver = true;
-        this.target = 0; // missions in all
-        this.away = 0; // orders that are not answered
+        this.rule = rule;
+        this.isOver = false;
         this.columns = new Set([cost, ...requirements.map(({metric}) => metric)].map(({column}) => column));
     }
 
-    /**
-     * Go on, up to so many missions in all.
-     * @param {number} missions
-     */
-    extend(missions) {
+    // Go on where it was stopped, or with what a moved bound has opened.
+    resume() {
         this.cells.forEach(({track}) => track.rewind());
-        this.target = missions;
-        this.away = 0;
-        this.isOver = !this.hasWork();
+        this.isOver = false;
+        if (this.isRoundComplete) this.beginRound();
     }
 
     get count() {
         return this.cells.reduce((sum, {track}) => sum + track.count, 0);
     }
 
-    get asked() {
-        return this.cells.reduce((sum, {track}) => sum + track.asked, 0);
-    }
-
-    hasWork() {
-        return this.asked < this.target && this.needed().length > 0;
+    get isRoundComplete() {
+        return this.cells.every(({track, wanted}) => track.count >= wanted);
     }
 
     /** @param {Cell} cell */
@@ -56,39 +55,36 @@ class Grid {
         return cell.track.estimate(this.cost);
     }
 
+    // More missions for the cells that are needed, as far as the budget reaches.
+    beginRound() {
+        const needed = this.needed(), room = this.rule.budget - this.count;
+        let steps = needed.map(({wanted}) => Math.floor(this.rule.growth * wanted));
+        if (steps.reduce((sum, step) => sum + step, 0) > room)
+            steps = steps.map((step) => Math.min(step, Math.floor(room / needed.length)));
+        needed.forEach((cell, n) => { cell.wanted += steps[n]; });
+        this.cells.sort((one, other) => this.costOf(one).mean - this.costOf(other).mean);
+        this.isOver = this.isRoundComplete;
+    }
+
     /**
-     * The cells whose missions decide which is the cheapest, as in the search of a study. First, all
-     * have a few. Until a cell meets the requirements, they are those that cost no more than one
-     * whose means meet them, or hardly more; then this cell and those that may be cheaper.
+     * The cells whose missions decide which is the cheapest. Until a cell meets the requirements, they are
+     * those that cost no more than one whose means meet them, or hardly more; then this cell and those that
+     * may be cheaper.
      * @returns {Cell[]}
      */
     needed() {
-        const begun = this.cells.filter(({track}) => track.asked < FEWEST);
-        if (begun.length) return begun;
-        if (this.cells.some(({track}) => track.count < FEWEST)) return [];
         const answer = this.cheapest();
         if (answer) return answer.rivals.length ? [answer.cell, ...answer.rivals] : [];
         const possible = this.cells.filter((cell) => this.verdict(cell) === "open");
-        const isPromising = (/** @type {Cell} */ {track}) => this.requirements.every((required) =>
-            roomOf(required, track.estimate(required.metric).mean) >= 0);
-        const most = Math.min(...possible.filter(isPromising).map((cell) => this.costOf(cell).mean)) + this.indifference;
+        const promising = possible.filter((cell) => this.isPromising(cell));
+        const most = Math.min(...promising.map((cell) => this.costOf(cell).mean)) + this.rule.indifference;
         return possible.filter((cell) => this.costOf(cell).mean <= most);
     }
 
-    // The next missions of a cell that is needed, the cheapest first. The cells take turns by blocks,
-    // since a worker has the arrays of few cells at a time.
+    // The next missions of the round, of the cheapest cell first. A worker has the arrays of few cells at a time.
     next() {
-        if (!this.hasWork()) return null;
-        const needed = this.needed(), turns = (/** @type {Cell} */ {track}) => Math.floor(track.asked / BLOCK);
-        const isBefore = (/** @type {Cell} */ one, /** @type {Cell} */ other) => {
-            if (turns(one) !== turns(other)) return turns(one) < turns(other);
-            if (one.track.asked !== other.track.asked) return one.track.asked > other.track.asked;
-            return this.costOf(one).mean < this.costOf(other).mean;
-        };
-        const {track} = needed.reduce((first, other) => isBefore(other, first) ? other : first);
-        const most = track.asked < FEWEST ? FEWEST - track.asked : Infinity;
-        this.away += 1;
-        return track.next(Math.min(most, this.target - this.asked));
+        const cell = this.cells.find(({track, wanted}) => track.asked < wanted);
+        return cell ? cell.track.next(cell.wanted - cell.track.asked) : null;
     }
 
     /** @param {Answer} answer */
@@ -97,8 +93,15 @@ class Grid {
         for (let place = 0; place < values.length; place++) // what no requirement asks for needs no interval
             if (!this.columns.has(place % width)) values[place] = NaN;
         this.cells.find(({track}) => track.name === answer.name)?.track.take(answer);
-        this.away -= 1;
-        this.isOver = this.away === 0 && !this.hasWork();
+        if (this.isRoundComplete) this.beginRound();
+    }
+
+    /**
+     * Whether the means of a cell meet the requirements.
+     * @param {Cell} cell
+     */
+    isPromising({track}) {
+        return this.requirements.every((required) => roomOf(required, track.estimate(required.metric).mean) >= 0);
     }
 
     /**
@@ -119,24 +122,61 @@ class Grid {
      */
     cheapest() {
         const costs = new Map(this.cells.map((cell) => [cell, this.costOf(cell)]));
-        const good = this.cells.filter((cell) => this.verdict(cell) === "met" && costs.get(cell).count >= FEWEST);
+        const good = this.cells.filter((cell) => this.verdict(cell) === "met");
         if (!good.length) return null;
         const cell = good.reduce((least, other) => costs.get(other).mean < costs.get(least).mean ? other : least);
         const rivals = this.cells.filter((other) =>
-            other !== cell && !(costs.get(cell).high - costs.get(other).low <= this.indifference) && this.verdict(other) !== "missed");
+            other !== cell && !(costs.get(cell).high - costs.get(other).low <= this.rule.indifference) && this.verdict(other) !== "missed");
         return {cell, rivals};
+    }
+
+    // About how many more missions decide which cell is the cheapest, if all are like those so far.
+    get missing() {
+        const leader = this.cheapest()?.cell, needed = this.needed();
+        return this.cells.reduce((sum, cell) => {
+            const ofRound = cell.wanted - cell.track.count;
+            const isOpen = cell !== leader && needed.includes(cell);
+            return sum + Math.max(ofRound, isOpen ? this.missingOf(cell, leader) : 0);
+        }, 0);
+    }
+
+    /**
+     * About how many more missions show whether a cell meets the requirements, or that it is hardly cheaper
+     * than the one that is known to.
+     * @type {(cell: Cell, leader?: Cell) => number}
+     */
+    missingOf(cell, leader) {
+        const {track} = cell, ways = [];
+        if (this.verdict(cell) === "open") {
+            const judged = (/** @type {Requirement} */ required) => missionsToJudge(required, track.estimate(required.metric));
+            const broken = this.requirements.filter((required) => roomOf(required, track.estimate(required.metric).mean) < 0);
+            // It misses if one is broken, and meets them once all are kept.
+            ways.push(broken.length ? Math.min(...broken.map(judged)) : Math.max(...this.requirements.map(judged)));
+        }
+        if (leader) {
+            const [costs, least] = [cell, leader].map((each) => this.costOf(each));
+            const gap = least.high - least.mean + costs.mean - costs.low, distance = costs.mean - least.mean + this.rule.indifference;
+            if (distance > 0) ways.push(missionsUntil(track.count, gap, gap, distance));
+        }
+        return Math.max(Math.min(...ways) - track.count, 0);
     }
 
     // Which cell is the cheapest, in words.
     inWords() {
         const answer = this.cheapest();
-        if (answer === null) {
-            const possible = this.cells.some((cell) => this.verdict(cell) === "open");
-            return possible ? "No cell is known to meet the requirements." : "No cell meets the requirements.";
-        }
-        const {cell, rivals} = answer, amount = written(this.cost, cell.track.estimate(this.cost).mean);
-        if (!rivals.length) return `The cheapest is ${cell.name} for ${amount}: every cheaper cell misses the requirements.`;
-        return `The cheapest so far is ${cell.name} for ${amount}; ${rivals.map(({name}) => name).join("; ")} may be cheaper.`;
+        const isOpen = this.cells.some((cell) => this.verdict(cell) === "open");
+        if (answer === null) return `No cell ${isOpen ? "is known to meet" : "meets"} the requirements.`;
+        const {cell, rivals} = answer, amount = written(this.cost, this.costOf(cell).mean);
+        if (rivals.length) return `The cheapest so far is ${cell.name} for ${amount}.`;
+        return `The cheapest is ${cell.name} for ${amount}: every cheaper cell misses the requirements.`;
+    }
+
+    // Which cells are open, the cheapest first, and about how many missions are missing.
+    openInWords() {
+        const leader = this.cheapest()?.cell, open = this.needed().filter((cell) => cell !== leader);
+        if (!open.length) return "";
+        const names = open.slice(0, MOST_NAMED).map(({name}) => name), others = open.length - names.length;
+        return `Open: ${names.join("; ")}${others ? `; and ${others} others` : ""}. To settle it would take ${aboutMissions(this.missing)} more missions.`;
     }
 
     /**

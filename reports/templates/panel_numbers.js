@@ -123,12 +123,25 @@ function sideOf(metric, low, high) {
 }
 
 /**
- * About how many more missions may decide a difference: an interval becomes narrower with about the root of their number.
+ * About how many missions bring the end of an interval as near to the mean as a distance. What was seen makes it
+ * narrower with the root of their number; what allows for failures that were not, with the number itself.
+ * @type {(count: number, gap: number, gapSeen: number, distance: number) => number}
+ */
+function missionsUntil(count, gap, gapSeen, distance) {
+    const seen = Math.min(gap, gapSeen), allowed = gap - seen;
+    return count * ((seen + Math.sqrt(seen ** 2 + 4 * allowed * distance)) / (2 * distance)) ** 2;
+}
+
+/** @param {number} missions */
+const aboutMissions = (missions) => missions < 1e6 ? `about ${quantity(Number(missions.toPrecision(1)))}` : "far";
+
+/**
+ * How many more missions may decide a difference.
  * @type {(estimate: Estimate) => string}
  */
-function moreMissions({mean, low, high, count}) {
-    const needed = count * ((high - low) / 2 / Math.abs(mean)) ** 2 - count;
-    return needed > 0 && needed < 1e6 ? `, about ${quantity(Number(needed.toPrecision(1)))} more missions` : "";
+function moreMissions({mean, low, high, lowSeen, highSeen, count}) {
+    const needed = missionsUntil(count, (high - low) / 2, (highSeen - lowSeen) / 2, Math.abs(mean)) - count;
+    return needed > 0 ? `, ${aboutMissions(needed)} more missions` : "";
 }
 
 /** @type {(requirement: Requirement) => string} */
@@ -153,4 +166,15 @@ function verdict(requirement, {mean, low, high, count}, tolerance = 0) {
     const isKept = Math.min(...rooms) >= -tolerance, isBroken = Math.max(...rooms) < tolerance;
     const isMeanGood = roomOf(requirement, mean) >= 0, {table} = VERDICTS;
     return table[Number(isKept)][Number(isBroken)] ?? table[Number(isMeanGood)][Number(!isMeanGood)];
+}
+
+/**
+ * About how many missions show whether a requirement is met, within its tolerance, if all are like those so far.
+ * @type {(requirement: Requirement, estimate: Estimate) => number}
+ */
+function missionsToJudge(requirement, {mean, low, high, lowSeen, highSeen, count}) {
+    const {tolerance} = requirement.metric, room = roomOf(requirement, mean), isGood = room >= 0;
+    const gap = (/** @type {number[]} */ ...ends) => Math.max(...ends.map((end) =>
+        isGood ? room - roomOf(requirement, end) : roomOf(requirement, end) - room));
+    return missionsUntil(count, gap(low, high), gap(lowSeen, highSeen), Math.abs(room) + tolerance);
 }

@@ -125,6 +125,20 @@ def test_tour_goes_on_from_nodes_that_are_never_without_data(data_rate):
     assert collected.min() > 0.5 * collected.max()
 
 
+@pytest.mark.parametrize("name", ["greedy", "tour", "age"])
+def test_a_node_beyond_the_battery_is_served_from_where_it_is_in_range(name):
+    """A full battery is 49 cells out and back; the range of 400 m is 5 cells."""
+    sheet = SHEET | {"cruise": "4 m/s", "data_rate": "1 MB/h"}
+    world = {"nodes": [[4, 0], [53, 0]], "grid": 64, "rows": 4, "zone": [0, 0, 1, 2], "uavs": 1}
+    result = simulate(Scenario.of(data_sheet=sheet, **world), policies.load(name), 3, events=True)
+    log = result.events.columns()
+    is_served = log["event"] == "communication"
+    collected = np.bincount(log["node"][is_served], log["value"][is_served], 2)
+    assert collected[1] > 0.2 * collected[0]
+    assert result.metrics["success"] == 1
+    assert max(x for x, _ in cells_of(result)) < 49
+
+
 # --- how good they are ---
 
 

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.base.elementary import exp_of_each, log, log10
+from dess.base.elementary import exp, exp_of_each, log
 from dess.base.kernels import inlined, kernel
 from dess.envs.observations import states as column
 from dess.envs.observations.states import CompactStates
 from dess.model.channel import World, efficiency
 from dess.model.state import HOVER, STEP_X, STEP_Y, mission_part
-from dess.physics.chart import Chart, is_open, spread
+from dess.physics.chart import FAR, NO_FLY, is_open, neighbours_of, spread_costs
 
 OWN, NODE, MATE, ZONE, ACTION = 30, 24, 17, 11, 14
 # Per node, teammate and zone: for each of the four moves whether it makes the way there shorter,
@@ -32,8 +32,10 @@ _NORMS = np.array([1.0, 2.5, 8.0], np.float32)  # by which sums of data x nearne
 # By which the nearness changes if the way is one cell shorter, and longer.
 _FACTORS = np.stack([exp_of_each(1 / SCALES), exp_of_each(-1 / SCALES)]).astype(np.float32)
 _FARTHEST = 255  # [cells]; all longer ways count as this one
-# Euclidean distances [cells] at which the rate tells what the channel is like.
-_PROBES = (1.0, 3.0, 8.0)
+# Distances [cells] at which the rate tells what the channel is like.
+_PROBES = (1, 3, 8)
+UNIT = 5  # the place of the unit of data in ``Sea.constants``
+_PER_LN10 = 1.0 / 2.302585092994046  # ln 10
 
 
 # What ``sea_of`` reads of a mission.
@@ -48,20 +50,18 @@ class Sea(NamedTuple):
     """What all missions on a sea share, as far as the observation needs it.
 
     Attributes:
-        chart: The zones, the no-fly cells and the ways.
+        zones: (H, W) as in ``Chart``.
         nodes: (K, 2) cells of the nodes.
         pads: (C,) charging pads of the zones.
-        unit: Data that a quarter of the nodes have less than at the start [data units]: what data
-            are divided by.
         rates: (L,) units that a UAV collects in a slot, by the distance in cells.
-        constants: (5,) the rates at the probes, the data that arrive at a node in 40 slots, and the
-            battery gained in a charging slot, all scaled.
+        constants: (6,) the rates at the probes, the data that arrive at a node in 40 slots, and the
+            battery gained in a charging slot, all scaled; then the data that a quarter of the nodes
+            have less than at the start [data units], by which data are divided.
     """
 
-    chart: Chart
+    zones: np.ndarray
     nodes: np.ndarray
     pads: np.ndarray
-    unit: np.float32
     rates: np.ndarray
     constants: np.ndarray
 
@@ -74,45 +74,53 @@ def sea_of(mission: np.void, world: World) -> Sea:
             parts share a sea.
         world: Its nodes and tables.
     """
-    length = float(mission["communication_slot_length"] * world.means.shape[2])
-    snr = world.mean_snr[0, :: (world.mean_snr.shape[1] - 1) // (len(world.mean_snr) - 1)]
-    low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
-    unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
-    rates = length * _efficiencies_at(mission, snr.copy()) / unit
-    probes = np.interp(_PROBES, np.arange(len(rates)), rates)
-    charging = mission["charge_rate"] / mission["charge_slots"]
-    others = [40 * arriving / unit, charging / 10]
-    return Sea(
-        world.chart,
-        world.nodes.copy(),
-        mission["zone_pads"][: len(world.chart.sizes)].copy(),
-        np.float32(unit),
-        rates.astype(np.float32),
-        np.array([*log10(probes + 1e-3), *others], np.float32),
-    )
+    distances = len(world.mean_snr)
+    zones = world.chart.zones
+    pads = mission["zone_pads"][: len(world.chart.sizes)].copy()
+    sea = Sea(zones, world.nodes, pads, np.empty(distances, np.float32), np.empty(6, np.float32))
+    fill_sea(mission, world.mean_snr, world.means.shape[2], sea.rates, sea.constants)
+    return sea
 
 
 @kernel
-def _efficiencies_at(mission, snr):
-    """(L,) spectral efficiencies [bit/s/Hz] at mean SNRs [dB]."""
-    efficiencies = np.empty(len(snr))
-    for number in range(len(snr)):
-        efficiencies[number] = efficiency(mission, snr[number])
-    return efficiencies
+def fill_sea(mission, mean_snr, slots, rates, constants):
+    """Write the rates and the constants of a sea.
+
+    Args:
+        mission: As ``sea_of``.
+        mean_snr: As in ``World``.
+        slots: The communication slots of a mission slot.
+        rates, constants: As in ``Sea``.
+    """
+    low = np.float64(mission.initial_low)
+    high = np.float64(mission.initial_high)
+    arriving = 40 * np.float64(mission.arrival_rate)
+    unit = max(0.75 * low + 0.25 * high, arriving, 1e-3)
+    length = mission.communication_slot_length * slots
+    step = (mean_snr.shape[1] - 1) // (len(mean_snr) - 1)
+    for cells in range(len(rates)):
+        rates[cells] = length * efficiency(mission, mean_snr[0, step * cells]) / unit
+    for probe in range(len(_PROBES)):
+        cells = min(_PROBES[probe], len(rates) - 1)
+        rate = length * efficiency(mission, mean_snr[0, step * cells]) / unit
+        constants[probe] = log(rate + 1e-3) * _PER_LN10
+    constants[3] = arriving / unit
+    constants[4] = mission.charge_rate / mission.charge_slots / 10
+    constants[UNIT] = unit
 
 
-class _Tables(NamedTuple):
-    """What follows from a sea.
+class Tables(NamedTuple):
+    """What follows from the zones, the no-fly cells and the nodes of a sea.
 
     Attributes:
-        ways: (H * W, K) cells from each cell to each node.
-        zone_ways: (H * W, C) cells from each cell to the nearest cell of each zone.
+        ways: (H * W, K) cells from each cell to each node, as int16.
+        zone_ways: (H * W, C) cells from each cell to the nearest cell of each zone, as int16.
         home: (H * W,) the least of these.
         node_home: (K,) the same from each node.
-        around: (K, 3, K) the nearness of nodes to each other, divided by ``_NORMS``, without that
-            of a node to itself.
+        around: (K, 3 * K) the nearness of nodes to each other, scale by scale, divided by
+            ``_NORMS``, without that of a node to itself.
         near: (_FARTHEST + 1, 4) the nearness by the way; the last column is 0.
-        shares, parts: One divided by a number + 1, and by a number.
+        shares, parts: (``_FARTHEST`` + H + W,) one divided by a number + 1, and by a number.
     """
 
     ways: np.ndarray
@@ -125,26 +133,72 @@ class _Tables(NamedTuple):
     parts: np.ndarray
 
 
+def empty_tables(size: tuple[int, int], nodes: int, zones: int) -> Tables:
+    """Tables for ``fill_tables`` of a sea of H rows and W columns, with nodes and zones."""
+    cells = size[0] * size[1]
+    numbers = _FARTHEST + size[0] + size[1]
+    i2, f4 = np.int16, np.float32
+    whole = (np.empty(shape, i2) for shape in ((cells, nodes), (cells, zones), cells, nodes))
+    shapes = ((nodes, 3 * nodes), (_FARTHEST + 1, 4), numbers, numbers)
+    return Tables(*whole, *(np.empty(shape, f4) for shape in shapes))
+
+
+@kernel
+def fill_tables(zones, nodes, tables):
+    """Write the tables of a sea.
+
+    Args:
+        zones: (H, W) as in ``Chart``.
+        nodes: (K, 2) cells of the nodes.
+        tables: The tables.
+    """
+    neighbours = neighbours_of(zones)
+    columns = zones.shape[1]
+    lengths = np.empty(zones.size, np.int16)
+    nearest = np.zeros(zones.size, np.int32)
+    places = nodes[:, 1] * columns + nodes[:, 0]
+    numbers = np.arange(zones.size)
+    for k in range(len(nodes)):
+        lengths[:] = FAR
+        if zones[nodes[k, 1], nodes[k, 0]] != NO_FLY:
+            spread_costs(neighbours, places[k : k + 1], None, True, FAR, lengths, nearest)
+        for cell in range(zones.size):
+            tables.ways[cell, k] = min(lengths[cell], _FARTHEST)
+    tables.home[:] = _FARTHEST
+    for zone in range(tables.zone_ways.shape[1]):
+        lengths[:] = FAR
+        cells_of_zone = numbers[zones.ravel() == zone]
+        spread_costs(neighbours, cells_of_zone, None, True, FAR, lengths, nearest)
+        for cell in range(zones.size):
+            tables.zone_ways[cell, zone] = min(lengths[cell], _FARTHEST)
+            tables.home[cell] = min(tables.home[cell], tables.zone_ways[cell, zone])
+    for k in range(len(nodes)):
+        tables.node_home[k] = tables.home[places[k]]
+    nearness = np.empty((_FARTHEST + 1, len(SCALES)))
+    for way in range(len(nearness)):
+        for s in range(len(SCALES)):
+            nearness[way, s] = exp(-way / SCALES[s])
+            tables.near[way, s] = nearness[way, s]
+        tables.near[way, len(SCALES)] = 0
+    for j in range(len(nodes)):
+        for s in range(len(SCALES)):
+            for k in range(len(nodes)):
+                around = nearness[tables.ways[places[k], j], s] / _NORMS[s]
+                if k == j:
+                    around = 0.0
+                tables.around[j, s * len(nodes) + k] = around
+    for number in range(len(tables.shares)):
+        tables.shares[number] = 1 / (number + 1)
+        tables.parts[number] = 1 / max(number, 1)
+
+
 @lru_cache(maxsize=16)
-def _tables(zones: bytes, shape: tuple[int, int], cells: bytes) -> _Tables:
+def _tables(zones: bytes, shape: tuple[int, int], cells: bytes) -> Tables:
     chart = np.frombuffer(zones, np.int8).reshape(shape)
     nodes = np.frombuffer(cells, np.int64).reshape(-1, 2)
-    ways = np.stack([spread(chart, node[None])[0] for node in nodes], 1)
-    rectangles = [np.argwhere(chart == zone)[:, ::-1] for zone in range(chart.max() + 1)]
-    zone_ways = np.stack([spread(chart, rectangle)[0] for rectangle in rectangles], 1)
-    ways = np.minimum(ways, _FARTHEST)
-    zone_ways = np.minimum(zone_ways, _FARTHEST)
-    nearness = exp_of_each(-np.arange(_FARTHEST + 1)[:, None] / SCALES)
-    near = np.pad(nearness, ((0, 0), (0, 1)))
-    places = nodes @ [1, shape[1]]
-    around = near[ways[places], :3].transpose(1, 2, 0) / _NORMS[:, None]
-    around *= (1 - np.eye(len(nodes)))[:, None]
-    home = zone_ways.min(1)
-    numbers = np.arange(sum(shape) + _FARTHEST)
-    shares = 1 / (numbers + 1)
-    parts = 1 / np.maximum(numbers, 1)
-    floats = (np.ascontiguousarray(a, np.float32) for a in (around, near, shares, parts))
-    return _Tables(ways, zone_ways, home, home[places], *floats)
+    tables = empty_tables(shape, len(nodes), int(chart.max()) + 1)
+    fill_tables(chart, nodes, tables)
+    return tables
 
 
 class Sets:
@@ -152,6 +206,7 @@ class Sets:
 
     Attributes:
         sea: The sea.
+        tables: Its tables.
         shapes: The shapes of its arrays per row; those of the class itself have empty sets.
     """
 
@@ -163,9 +218,7 @@ class Sets:
 
     def __init__(self, sea: Sea, uavs: int = 1):
         self.sea = sea
-        self._tables = _tables(
-            sea.chart.zones.tobytes(), sea.chart.zones.shape, sea.nodes.tobytes()
-        )
+        self.tables = _tables(sea.zones.tobytes(), sea.zones.shape, sea.nodes.tobytes())
         self.shapes = ((OWN,), (5, ACTION), *self._set_shapes(uavs - 1))
 
     def _set_shapes(self, mates: int) -> tuple[tuple[int, int], ...]:
@@ -186,48 +239,119 @@ class Sets:
         """
         shapes = *self.shapes[:2], *self._set_shapes(states.uavs.shape[1] - 1)
         out = tuple(np.zeros((len(missions), *shape), np.float32) for shape in shapes)
-        _encode(states, missions, uavs, self.sea, self._tables, out)
+        _encode(states, missions, uavs, self.sea, self.tables, out)
         return out
 
 
 @kernel
 def _encode(states, rows_mission, rows_uav, sea, tables, out):
-    count = len(sea.nodes)
-    columns = sea.chart.zones.shape[1]
-    places = np.empty(5, np.int64)
-    opens = np.empty(5, np.bool_)
-    data = np.empty(count, np.float32)
-    units = np.float32(1.0) / sea.unit
-    memory = (
-        np.empty((7, count), np.float32),
-        np.empty(count, np.int16),
-        np.empty((5, 8), np.float32),
-    )
+    memory = memory_of(sea)
     for row in range(len(rows_mission)):
-        b = rows_mission[row]
-        i = rows_uav[row]
-        if i < 0:
-            continue
-        mission = states.missions[b]
-        team = states.uavs[b]
-        residual = states.residual[b]
-        x = np.int64(team[i, column.X])
-        y = np.int64(team[i, column.Y])
-        for action in range(5):
-            to_x = x + STEP_X[action]
-            to_y = y + STEP_Y[action]
-            opens[action] = is_open(sea.chart.zones, to_x, to_y)
-            places[action] = to_y * columns + to_x if opens[action] else y * columns + x
-        total = np.float32(0.0)
-        for k in range(count):
-            data[k] = residual[k] * units
-            total += data[k]
-        mean = total / np.float32(count)
-        _own(mission, team, i, sea, mean, total, out[0][row])
-        _nodes(team, i, data, sea, tables, places, mean, memory, out[2][row], out[3][row])
-        _actions(team, i, data, sea, tables, places, opens, mean, memory[2], out[1][row])
-        _mates(team, i, columns, tables, out[4][row], out[5][row])
-        _zones(team, i, sea, tables, places, columns, out[6][row], out[7][row])
+        if rows_uav[row] >= 0:
+            parts = Parts(
+                out[0][row], out[1][row], out[2][row], out[3][row],
+                out[4][row], out[5][row], out[6][row], out[7][row],
+            )  # fmt: skip
+            observe(states, rows_mission[row], rows_uav[row], sea, tables, memory, parts)
+
+
+class Parts(NamedTuple):
+    """The observation of one UAV, for N nodes, I - 1 teammates and C zones, all as float32.
+
+    Attributes:
+        own: (30,) the own state.
+        actions: (5, 14) the actions.
+        nodes, mates, zones: (N, 24), (I - 1, 17) and (C, 11) a row for each.
+        node_moves, mate_moves, zone_moves: (9, N), (9, I - 1) and (9, C) which moves lead there.
+    """
+
+    own: np.ndarray
+    actions: np.ndarray
+    nodes: np.ndarray
+    node_moves: np.ndarray
+    mates: np.ndarray
+    mate_moves: np.ndarray
+    zones: np.ndarray
+    zone_moves: np.ndarray
+
+
+class Memory(NamedTuple):
+    """What ``observe`` computes on the way.
+
+    Attributes:
+        places: (5,) the cells that the actions lead to.
+        opens: (5,) whether the actions are possible.
+        data: (K,) the data of the nodes, in units of the sea.
+        free, crowd: (K,) the share of the data, and of a node, that teammates leave.
+        around: (5, K) the nearness of other data: of what is free by scale, then of all by the
+            last two scales.
+        least: (K,) the way from the nearest teammate.
+        sums: (5, 8) the sums of data times nearness, by move and of all.
+    """
+
+    places: np.ndarray
+    opens: np.ndarray
+    data: np.ndarray
+    free: np.ndarray
+    crowd: np.ndarray
+    around: np.ndarray
+    least: np.ndarray
+    sums: np.ndarray
+
+
+@kernel
+def memory_of(sea):
+    """The memory of ``observe`` for a sea."""
+    count = len(sea.nodes)
+    f4 = np.float32
+    return Memory(
+        np.empty(5, np.int64),
+        np.empty(5, np.bool_),
+        np.empty(count, f4),
+        np.empty(count, f4),
+        np.empty(count, f4),
+        np.empty(5 * count, f4),
+        np.empty(count, np.int16),
+        np.empty((5, 8), f4),
+    )
+
+
+@inlined
+def observe(states, b, i, sea, tables, memory, parts):
+    """Write what UAV ``i`` of mission ``b`` observes, all of it.
+
+    Args:
+        states: ``CompactStates``.
+        b, i: The mission and the UAV.
+        sea, tables: The ``Sea`` and its ``Tables``.
+        memory: The ``Memory``.
+        parts: The ``Parts``.
+    """
+    columns = sea.zones.shape[1]
+    places = memory.places
+    opens = memory.opens
+    data = memory.data
+    mission = states.missions[b]
+    team = states.uavs[b]
+    residual = states.residual[b]
+    x = np.int64(team[i, column.X])
+    y = np.int64(team[i, column.Y])
+    for action in range(5):
+        to_x = x + STEP_X[action]
+        to_y = y + STEP_Y[action]
+        opens[action] = is_open(sea.zones, to_x, to_y)
+        places[action] = to_y * columns + to_x if opens[action] else y * columns + x
+    units = np.float32(1.0) / sea.constants[UNIT]
+    total = np.float32(0.0)
+    for k in range(len(data)):
+        data[k] = residual[k] * units
+        total += data[k]
+    mean = total / np.float32(len(data))
+    _own(mission, team, i, sea, mean, total, parts.own)
+    _nodes(team, i, data, sea, tables, places, mean, memory, parts.nodes, parts.node_moves)
+    _actions(team, i, data, sea, tables, places, opens, mean, memory.sums, parts.actions)
+    _mates(team, i, columns, tables, parts.mates, parts.mate_moves)
+    _zones(team, i, sea, tables, places, columns, parts.zones, parts.zone_moves)
 
 
 @inlined
@@ -235,15 +359,19 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     """Write the nodes; leave the sums of data times nearness, by move and of all, in memory."""
     me = team[i]
     cells = sea.nodes
-    columns = sea.chart.zones.shape[1]
+    columns = sea.zones.shape[1]
     count = len(data)
-    by_node, least, sums = memory
-    free, crowd, near_0, near_1, near_2, beyond_1, beyond_2 = by_node
+    free = memory.free
+    crowd = memory.crowd
+    around = memory.around
+    least = memory.least
+    sums = memory.sums
     ways_from_here = tables.ways[places[HOVER]]
     x = np.int64(me[column.X])
     y = np.int64(me[column.Y])
     least[:] = 1000
-    by_node[1:] = 0.0
+    crowd[:] = 0.0
+    around[:] = 0.0
     for j in range(len(team)):
         if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:
             ways_of_mate = tables.ways[team[j, column.Y] * columns + team[j, column.X]]
@@ -254,17 +382,19 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         mine = tables.near[ways_from_here[k], 1] + np.float32(1e-9)
         crowd[k] = mine / (mine + crowd[k])
         free[k] = data[k] * crowd[k]
+    of_free = around[: 3 * count]
+    of_all = around[3 * count :]
+    # With one input and one output in each loop, the compiler makes vectors of it.
     for j in range(count):
         if data[j] > 0.0:
-            around = tables.around[j]
             full = data[j]
             share = free[j]
-            for k in range(count):
-                near_0[k] += share * around[0, k]
-                near_1[k] += share * around[1, k]
-                near_2[k] += share * around[2, k]
-                beyond_1[k] += full * around[1, k]
-                beyond_2[k] += full * around[2, k]
+            near_j = tables.around[j]
+            near_j_far = near_j[count:]
+            for k in range(len(of_free)):
+                of_free[k] += share * near_j[k]
+            for k in range(len(of_all)):
+                of_all[k] += full * near_j_far[k]
     needed = np.int64(me[column.NEEDED])
     battery = np.int64(me[column.BATTERY])
     own_home = np.int64(tables.home[places[HOVER]])
@@ -299,7 +429,7 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         line[12] = _share(spare, 20)
         line[13] = _share(spare, 4)
         for part in range(5):
-            line[14 + part] = by_node[2 + part, k]
+            line[14 + part] = around[part * count + k]
         line[19] = min(np.float32(way) * per_slot, np.float32(3.0))
         line[20] = line[1] * near[1]
         line[21] = min(_rate(sea.rates, dx * dx + dy * dy), np.float32(2.0))
@@ -318,6 +448,8 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
             sums[HOVER, 4 + s] += free[k] * near[s]
         moves[8, k] = 1.0
         length = abs(dx) + abs(dy)
+        for part in range(4, 8):
+            moves[part, k] = 0.0
         if length > 0:
             east = dx * tables.parts[length]
             south = dy * tables.parts[length]
@@ -401,7 +533,10 @@ def _mates(team, i, columns, tables, lines, moves):
             continue
         mate = team[j]
         line = lines[number]
+        to = moves[:, number]
         number += 1
+        line[:] = 0.0
+        to[:] = 0.0
         if not mate[column.ACTIVE]:
             continue
         dx = np.int64(mate[column.X]) - me[column.X]
@@ -428,7 +563,6 @@ def _mates(team, i, columns, tables, lines, moves):
         line[14] = battery < me[column.BATTERY]
         line[15] = (needed - me[column.NEEDED]) / 50.0
         line[16] = home == 0
-        to = moves[:, number - 1]
         to[0] = dy < 0
         to[1] = dx > 0
         to[2] = dy > 0
@@ -476,6 +610,7 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
         line[10] = min(max(slack, -8), 8) / 8.0
         for move in range(4):
             moves[move, zone] = tables.zone_ways[places[move], zone] < way
+            moves[4 + move, zone] = 0.0
         moves[8, zone] = 1.0
 
 
@@ -484,7 +619,7 @@ def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
     """Write per action what is known of the cell it leads to."""
     me = team[i]
     cells = sea.nodes
-    columns = sea.chart.zones.shape[1]
+    columns = sea.zones.shape[1]
     for action in range(5):
         line = lines[action]
         place = places[action]
@@ -493,7 +628,8 @@ def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
         line[0] = action == HOVER
         line[1] = me[column.MASK] >> action & 1
         line[2] = opens[action]
-        line[3] = sea.chart.zones[y, x] >= 0
+        line[3] = sea.zones[y, x] >= 0
+        line[4] = 0.0
         for j in range(len(team)):
             if j != i and team[j, column.ACTIVE]:
                 way = abs(team[j, column.X] - x) + abs(team[j, column.Y] - y)
@@ -518,6 +654,7 @@ def _actions(team, i, data, sea, tables, places, opens, mean, sums, lines):
             ):
                 square = distance
                 served = k
+        line[11:] = 0.0
         if served >= 0:
             rate = _rate(sea.rates, square)
             line[11] = min(rate, np.float32(2.0))

@@ -116,14 +116,15 @@ def compact_states(
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     reach = (ways or Ways(state.missions, chart)).reach
-    rows = _active_rows(state.missions, state.uavs)
-    guidance = guide(state.missions, state.uavs, state.residual, *rows, chart, reach, True)
-    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, *guidance, *states)
+    rows = active_rows(state.missions, state.uavs)
+    now = state.missions, state.uavs, state.residual
+    guidance = guide(*now, *rows, chart, reach, True)
+    fill_states(*now, guarded, chart, reach, *guidance, *states)
     return states
 
 
 @kernel
-def _active_rows(missions, uavs):
+def active_rows(missions, uavs):
     """The (R,) missions and (R,) UAV indices of all active UAVs."""
     rows_mission = np.empty(uavs.size, np.int64)
     rows_uav = np.empty(uavs.size, np.int64)
@@ -137,10 +138,20 @@ def _active_rows(missions, uavs):
 
 
 @kernel
-def _fill(
+def fill_states(
     missions, uavs, residual, guarded, chart, reach, charge, home, safe,
     out_missions, out_uavs, out_residual,
 ):  # fmt: skip
+    """Write the compact states of missions.
+
+    Args:
+        missions, uavs, residual: As in ``State``.
+        guarded: As ``compact_states``.
+        chart: The chart.
+        reach: ``Ways.reach``.
+        charge, home, safe: The ``Guidance`` of all active UAVs.
+        out_missions, out_uavs, out_residual: The states, filled with zeros.
+    """
     guided = 0  # the active UAVs so far
     for b in range(len(missions)):
         mission = missions[b]

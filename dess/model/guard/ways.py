@@ -3,10 +3,10 @@
 import numpy as np
 
 from dess.base.kernels import inlined, shared_kernel
-from dess.model.guard.battery import cannot_leave, ends_soon, usable_battery
+from dess.model.guard.battery import cannot_leave, ends_soon, margin, usable_battery
 from dess.model.state import EAST, NORTH, SOUTH, WEST
 from dess.model.ways import is_calm
-from dess.physics.charging import longest_charge
+from dess.physics.charging import charge_limit, longest_charge
 from dess.physics.chart import cost_around, distance, length_around
 from dess.physics.energy import PERCENT, dearest_slot, has_costs, slot_cost, waiting_slot
 from dess.physics.landing import lands
@@ -215,10 +215,27 @@ def round_trip(mission, u, chart, x, y, home, reach):
         near = chart.parking[chart.nearest[y, x]]
         cells = distance(chart, x, y, near[0], near[1])
         back = min(back, battery_of_way(mission, u, chart, x, y, near[0], near[1], cells, reach))
-    cells = distance(chart, u.x, u.y, x, y)
+    return _battery_to(mission, u, chart, u.x, u.y, x, y, reach) + back
+
+
+@inlined
+def is_beyond_battery(mission, u, chart, x, y, reach):
+    """Whether UAV ``u`` cannot fly to a cell and back from the nearest zone, fully charged."""
+    near = chart.parking[chart.nearest[y, x]]
+    cells = distance(chart, x, y, near[0], near[1])
+    spent = _battery_to(mission, u, chart, near[0], near[1], x, y, reach)
+    spent += battery_of_way(mission, u, chart, x, y, near[0], near[1], cells, reach)
+    kept = margin(mission, u) + waiting_slot(mission)
+    return spent + kept > PERCENT * charge_limit(mission, u)
+
+
+@inlined
+def _battery_to(mission, u, chart, from_x, from_y, x, y, reach):
+    """The battery that UAV ``u`` needs from one cell to another, without gusts."""
+    cells = distance(chart, from_x, from_y, x, y)
     if is_calm(reach):
-        return PERCENT * cells + back
-    return battery_of_flight(mission, u.slots_per_cell, x - u.x, y - u.y, cells) + back
+        return PERCENT * cells
+    return battery_of_flight(mission, u.slots_per_cell, x - from_x, y - from_y, cells)
 
 
 @inlined

@@ -250,9 +250,9 @@ def test_compiled_code_rounds_a_product_before_it_is_added():
         assert (out == 0.0).all()  # fused, it would be -2**-60
 
 
-# The rooms on the way to the records of heuristics and of the planner.
+# The rooms on the way to the records of heuristics, of the planner and of a network in integers.
 ROOMS = ("dess/base", "dess/physics", "dess/scenario", "dess/model", "dess/envs/observations")
-ROOMS += ("policies/planner", "policies/heuristics.py")
+ROOMS += ("policies/planner", "policies/heuristics.py", "policies/integers.py")
 # What is exact, or rounded in one way only: all else of ``math`` is the C library's.
 OF_MATH = {
     *("ceil", "floor", "fsum", "inf", "isfinite", "isnan", "lcm", "nan", "pi", "radians", "sqrt"),
@@ -271,8 +271,6 @@ EXCEPTIONS = {
     "cells and counts are whole numbers": {
         ("dess/envs/observations/components.py", "mission.pads_out[:mission.pads].sum()"),
         ("dess/envs/observations/states.py", "np.abs(cells - nearest).sum(1)"),
-        ("dess/envs/observations/sets.py", "nodes @ [1, shape[1]]"),
-        ("dess/envs/observations/sets.py", "sum(shape)"),
         ("dess/model/view.py", "constants['pads_out'].sum(1)"),
         ("dess/scenario/consistency.py", "MOST_CHARTED ** 2"),
         (
@@ -286,6 +284,13 @@ EXCEPTIONS = {
         ("policies/heuristics.py", "cells @ [1, shape[1]]"),
         ("policies/planner/drawing.py", "crafts['active'].sum()"),
     },
+    "widths of layers are whole numbers": {
+        ("policies/integers.py", "sum(_POOLED)"),
+        ("policies/integers.py", "sum(_POOLED[:number])"),
+        ("policies/integers.py", "sum((inputs * outputs for inputs, outputs in LAYERS.values()))"),
+        ("policies/integers.py", "sum((LAYERS[name][1] for name in SHIFTED))"),
+        ("policies/integers.py", "sum(SCALES.values())"),
+    },
     "they are lists": {
         ("dess/envs/observations/components.py", "sum(_beyond_the_paper(space), [])"),
         ("dess/envs/observations/components.py", "sum(map(len, groups))"),
@@ -295,9 +300,6 @@ EXCEPTIONS = {
         ),
     },
     "of cells, open or not": {("dess/scenario/no_fly.py", "from scipy import ndimage")},
-    "the ways are read where they are whole numbers": {
-        ("dess/envs/observations/sets.py", "np.interp"),
-    },
     "compiled, it is a loop": {
         ("policies/planner/policy.py", "residual[b].sum()"),
     },

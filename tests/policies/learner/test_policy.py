@@ -16,7 +16,7 @@ from dess.model.channel import world_of
 from dess.model.guard import guard
 from dess.model.mission import simulate
 from dess.model.state import constants_of
-from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.learner.policy import FloatNetwork, LearnedPolicy
 from dess.policies.network import DuelingNetwork, SetNetwork, Sizes, weight_shapes
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.model.flights import assert_same_alone, cells_of
@@ -39,7 +39,8 @@ def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> LearnedPolic
     """A policy of random weights."""
     vector = Vector(layout)
     weights = _weights(DuelingNetwork.layer_sizes(vector.shapes, [32, 32]), seed)
-    return LearnedPolicy("random weights", vector, DuelingNetwork, weights, guarded, layout)
+    network = FloatNetwork(DuelingNetwork, weights)
+    return LearnedPolicy("random weights", vector, network, guarded, layout)
 
 
 class _Fixed:
@@ -56,7 +57,8 @@ class _Fixed:
 
 def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> LearnedPolicy:
     layout, weights = layout_of(space), {"values": np.array(values)}
-    return LearnedPolicy("fixed", Vector(layout), _Fixed, weights, guarded, layout)
+    network = FloatNetwork(_Fixed, weights)
+    return LearnedPolicy("fixed", Vector(layout), network, guarded, layout)
 
 
 @settings(max_examples=10)
@@ -127,7 +129,8 @@ LAYERS = SetNetwork.layer_sizes(Sets.shapes, [16, 8, 16])
 
 def _any(seed: int = 1) -> LearnedPolicy:
     """A policy of random weights that decides on any sea."""
-    return LearnedPolicy("any", Sets, SetNetwork, _weights(LAYERS, seed), True, None)
+    network = FloatNetwork(SetNetwork, _weights(LAYERS, seed))
+    return LearnedPolicy("any", Sets, network, True, None)
 
 
 @settings(max_examples=8)

@@ -7,10 +7,12 @@ import re
 from base64 import b64decode, b64encode
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from playwright.sync_api import Locator
 from playwright.sync_api import Page as Tab
 
 from dess import InputError, load_scenario, policies, simulate_batch
@@ -31,6 +33,7 @@ from dess.analysis.stats.verdict import (
     position_of,
     position_with_allowance,
 )
+from dess.analysis.study.cheapest import GROWTH, Cheapest, Setting
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
 from dess.analysis.wasm.image import copy_inputs, make_image
@@ -45,9 +48,11 @@ from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
+from tests.analysis.small import SCENARIO, SHEET
 from tests.flown import Engine
 
 PAPER = load_scenario("paper")
+SMALL_SHEET = ScenarioSpace.of(**SCENARIO | SHEET)
 SEED = 7
 MISSIONS = 120  # of a run
 PATIENCE = 60_000  # ms
@@ -155,9 +160,9 @@ def test_failures_of_a_sheet_are_a_setting_in_its_words():
 
 
 def test_where_one_sheet_has_no_failures_the_sides_differ_by_what_follows_from_the_other():
-    sea = load_scenario("jade-bight")
-    failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
-    panel = panels._panel_of(sea, failing, "jade-bight", ["greedy"], SEED, {})
+    sea = SMALL_SHEET
+    failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "10 h", "data_sheet.repair": "1 h"})
+    panel = panels._panel_of(sea, failing, "small", ["greedy"], SEED, {})
     baseline, variation = panel.spaces
     settings = dict(panel_settings.settings_of(baseline, variation))
     assert not [key for key, values in settings.items() if values[0] == values[-1]]
@@ -197,7 +202,8 @@ def test_the_prices_of_a_year_can_be_changed():
 def test_the_grid_says_whose_answer_the_page_has(policy):
     """Where the panel cannot simulate its policy, and why the grid may have another one."""
     space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
-    search = Search(policy=policy, fleet="3 UAVs, 2 pads", tolerance=0.01, indifference=500)
+    rule = rule_of_search(tolerance=0.01, indifference=500)
+    search = Search(policy=policy, fleet="3 UAVs, 2 pads", rule=rule)
     about = {"costs": Costs(uav=1000), "requirements": [required], "search": search}
     varied = {"uavs": [1, 2], "pads": [1]}
     panel = str(make_panel(space, space, "paper", [policy], SEED, varied=varied, **about).data)
@@ -243,16 +249,12 @@ def test_any_variation_has_a_panel_or_a_sentence(baseline, variation):
 
 def test_a_panel_says_that_it_has_no_requirements_of_the_worst_node():
     """A fleet that keeps only the others would be called right."""
-    space = load_scenario("jade-bight")
+    space = SMALL_SHEET
     required = [Requirement(metric_of(name), 0.5) for name in ("success", "least")]
-    panel = str(
-        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required).data
-    )
+    panel = str(make_panel(space, space, "small", ["greedy"], SEED, requirements=required).data)
     assert "since it does not know what is collected of each node" in panel
     assert '<option value="success" selected>' not in panel
-    panel = str(
-        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required[:1]).data
-    )
+    panel = str(make_panel(space, space, "small", ["greedy"], SEED, requirements=required[:1]).data)
     assert '<option value="success" selected>' in panel
 
 
@@ -655,19 +657,35 @@ def test_a_run_goes_on_where_it_ended(visit, document):
     assert cells_of(tab, metric_of(PRODUCT).name)[0].startswith(f"{mean:.1f} % [")
 
 
+def rule_of_search(**values: Any) -> Cheapest:
+    return Cheapest(procedure="cheapest", requirements={PRODUCT: 0.7}, **values)
+
+
+RULE = rule_of_search(indifference=10, first=30, budget=800)
+PRICES = Costs(uav=1000, pad=300)
+
+
 @pytest.fixture(scope="module")
 def searched(tmp_path_factory) -> Path:
     """A page with the panel of a search for the cheapest fleet."""
     space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
     fleets = {"uavs": [1, 2], "pads": [1, 4]}
-    costs = Costs(uav=1000, pad=300)
-    about = {"costs": costs, "requirements": [required], "varied": fleets}
+    search = Search(policy="greedy", fleet="2 UAVs and 1 pad", rule=RULE)
+    about = {"costs": PRICES, "requirements": [required], "varied": fleets, "search": search}
     given = {"uavs": 2, "pads": 1}
     panel = make_panel(space, space, "paper", ["greedy"], SEED, given=given, **about)
     shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
     path = tmp_path_factory.mktemp("panel") / "page.html"
     path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
     return path
+
+
+def fill_grid(tab: Tab) -> Locator:
+    """Fill the grid, and return the line of its state."""
+    tab.get_by_role("button", name="Fill the grid").click()
+    status = tab.locator("[data-panel=grid-status]")
+    status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
+    return status
 
 
 def grid_of(tab: Tab) -> dict[tuple[int, int], tuple[str, str]]:
@@ -684,10 +702,8 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     """Its intervals are those of Python, for all cells together, and hold for other bounds."""
     opened = visit(searched, 1280)
     tab = opened.page
-    tab.locator("[name=grid-missions]").fill("400")
-    tab.get_by_role("button", name="Fill the grid").click()
-    status = tab.locator("[data-panel=grid-status]")
-    status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
+    status = fill_grid(tab)
+    assert tab.locator("[data-panel=grid-bar]").evaluate("bar => bar.value") == 1
     grid = grid_of(tab)
     assert {fleet: look for fleet, (look, _) in grid.items()} == {
         (1, 1): "missed",
@@ -697,20 +713,32 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
     }
     assert "30 missions" in grid[2, 4][1]
     ends = {}
+    samples = {}
     for (uavs, pads), (_, text) in grid.items():
         count = int(re.search(r"(\d+) missions", text)[1])
         space = load_scenario("paper", uavs=uavs, pads=pads)
         records = simulate_batch(space, policies.load("greedy"), SEED, count)
-        sequence = new_sequence(0, 1, 0.05 / len(grid))
-        add_values(sequence, records.missions[PRODUCT])
+        products = records.missions[PRODUCT]
+        samples[uavs, pads] = {PRODUCT: products, "cost": np.full(count, 1000 * uavs + 300 * pads)}
+        sequence = new_sequence(0, 1, 0.05 / (2 * len(grid)))  # an interval of the cost as well
+        add_values(sequence, products)
         low, high = ends[uavs, pads] = sequence_ends(sequence)
         assert f"[{100 * low:.1f}, {100 * high:.1f}]" in text
+    settings = [Setting({"uavs": uavs, "pads": pads}, 0.0) for uavs, pads in samples]
+    choice = RULE.choice([*samples.values()], settings)
+    assert [[*samples][point] for point in choice.selected] == [(2, 1)]
+    for sample, count in zip(samples.values(), choice.counts, strict=True):
+        rounds = [RULE.first]
+        while rounds[-1] < len(sample[PRODUCT]):
+            rounds.append(rounds[-1] + int(GROWTH * rounds[-1]))
+        assert count <= len(sample[PRODUCT]) == rounds[-1]
     before = str(status.text_content())
     assert "The cheapest is 2 UAVs, 1 pad for 2,300 EUR" in before
     tab.locator("[name=bound-0]").fill(str(100 * np.mean(ends[1, 1])))  # no one knows
-    assert "The cheapest so far is 2 UAVs, 1 pad for 2,300 EUR; 1 UAV, 1 pad" in str(
-        status.text_content()
-    )
+    said = str(status.text_content())
+    assert "The cheapest so far is 2 UAVs, 1 pad for 2,300 EUR. Open: 1 UAV, 1 pad; " in said
+    assert re.search(r"To settle it would take about [\d,]+ more missions\.", said)
+    assert 0 < tab.locator("[data-panel=grid-bar]").evaluate("bar => bar.value") < 1
     command = str(tab.locator("[data-panel=fill-command]").text_content())
     assert (
         "dess sweep --policy greedy --set uavs=1,2 --set pads=1,4 --require product=0." in command
@@ -733,17 +761,16 @@ def test_the_grid_says_what_is_known_of_each_fleet(visit, searched):
 def test_the_grid_is_stopped_and_goes_on(visit, searched):
     tab = visit(searched, 390).page
     tab.locator("[name=bound-0]").fill("58.5")  # too near to the mean of one UAV
-    tab.locator("[name=grid-missions]").fill("100000")
     tab.get_by_role("button", name="Fill the grid").click()
     status = tab.locator("[data-panel=grid-status]")
     status.get_by_text(re.compile(r"[1-9]\d* missions, running")).wait_for(timeout=PATIENCE)
     tab.get_by_role("button", name="Stop").first.click()
-    (stopped,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
-    tab.locator("[name=grid-missions]").fill("50")
-    tab.get_by_role("button", name="Fill the grid").click()
-    status.get_by_text(re.compile(r"\d missions\.$")).wait_for(timeout=PATIENCE)
-    (later,) = re.findall(r"([\d,]+) missions\.", str(status.text_content()))
-    assert int(later.replace(",", "")) == int(stopped.replace(",", "")) + 50
+    (stopped,) = re.findall(r"([\d,]+) missions\.$", str(status.text_content()))
+    assert int(stopped.replace(",", "")) < RULE.budget
+    said = str(fill_grid(tab).text_content())
+    (ended,) = re.findall(r"([\d,]+) missions\.$", said)
+    assert RULE.budget - len(grid_of(tab)) < int(ended.replace(",", "")) <= RULE.budget
+    assert "Open: 1 UAV, 1 pad" in said
     assert tab.evaluate("document.documentElement.scrollWidth") <= 390
 
 
