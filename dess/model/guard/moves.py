@@ -69,7 +69,7 @@ def _stands(mission, uavs, j, sizes, turns):
     Where there is a plan, it tells who is about to leave its cell. A teammate flies into the cell
     that is left: around it, both might come to each other's way again and again.
     """
-    if turns is None:
+    if turns is None or not is_tight(mission, sizes):
         return is_parked(mission, uavs[j], sizes)
     return may_stand(mission, uavs[j]) and not turns[j].leaves
 
@@ -286,15 +286,17 @@ def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach
             clear |= bit
         if late <= reserve:
             in_time |= bit
-            delay = late if lands(mission) else 0
-            if level < 2 and delay < least_aside:
-                least_aside, aside = delay, 0
-            if level < 2 and delay == least_aside:
+        if lands(mission) and late <= reserve and level < 2:
+            if late < least_aside:
+                least_aside, aside = late, 0
+            if late == least_aside:
                 aside |= bit
         if late < least:
             least, nearest = late, 0
         if late == least:
             nearest |= bit
+    if not lands(mission):
+        aside = clear & in_time
     return Moves(nearest, in_time, clear, empty, aside, least)
 
 
@@ -516,7 +518,7 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
     home = stays(uavs[i])
     if charge or find_home:
         home = parking_cell(mission, uavs, i, data, chart, memory, reach)
-    else:
+    elif is_tight(mission, chart.sizes):
         forget_plan(mission, memory.plan)
     return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory, reach)
 
