@@ -1,6 +1,6 @@
 """The metrics of missions: what they are called, measured in, and how they are written."""
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf
@@ -10,8 +10,6 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.base.errors import InputError, unknown_name
-from dess.model.record import MISSION_RECORD, measures_of
 from dess.scenario.data_sheet import Units
 from dess.scenario.quantities import measured, printed
 from dess.scenario.scenario import ScenarioSpace
@@ -137,7 +135,7 @@ class Metric:
         """What a value of its column is multiplied by to be told."""
         if self.told_unit:
             size = measured(f"1 {self.told_unit}", "s")[0]
-            return _UNITS[self.unit][1] / size
+            return SHEET_UNITS[self.unit][1] / size
         return 1.0
 
     @property
@@ -155,7 +153,7 @@ class Metric:
     @property
     def is_in_sheet_unit(self) -> bool:
         """Whether it is in a unit of a data sheet, which is written behind every value."""
-        return self.unit in _UNITS
+        return self.unit in SHEET_UNITS
 
     @property
     def is_outcome(self) -> bool:
@@ -227,7 +225,12 @@ BOUND, GAP = "upper_bound", "optimality_gap"
 
 _SLOTS, _DATA = "mission slots", "data units"
 # What a unit of a data sheet measures, and how large it is [s], [bit], [m].
-_UNITS = {"min": ("slot", 60.0), "h": ("slot", 3600.0), "MB": ("data", 8e6), "km": ("cell", 1e3)}
+SHEET_UNITS = {
+    "min": ("slot", 60.0),
+    "h": ("slot", 3600.0),
+    "MB": ("data", 8e6),
+    "km": ("cell", 1e3),
+}
 # The units of maps, of curves over time and of the player, where there is a data sheet.
 DRAWN_UNITS = {"length": "km", "time": "h", "data": "MB"}
 # The columns of the longest that each mission may last, and that a UAV may wait for a pad in it.
@@ -344,13 +347,6 @@ _IN_SHEET_UNIT = {metric.column: metric.in_units.column for metric in _ALL}
 _KNOWN = {metric.column: metric for metric in _ALL}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
 
-_PER_UAV = "collected_per_uav"
-# What a mission collects and leaves, by the metrics that are a part of both together.
-_DATA_KEPT = {column: (COLLECTED, "residual") for column in (COLLECTED, "residual", _PER_UAV)}
-_DATA_KEPT |= {
-    _IN_SHEET_UNIT[column]: (_IN_SHEET_UNIT[COLLECTED], _IN_SHEET_UNIT["residual"])
-    for column in _DATA_KEPT
-}
 # The columns of the values of all nodes of a mission, of which a metric has those of the worst one.
 NODE_RATIOS, NODE_AGES = "node_ratios", "node_ages"
 NODES_BEHIND = {
@@ -390,180 +386,14 @@ def metric_of(column: str | Metric) -> Metric:
     return _KNOWN.get(column) or Metric(column, column.replace("_", " ").capitalize())
 
 
-def metric_for_length(
-    column: str, slots: int, units: Units | None, uavs: int = 1, idle: float = 0.0
-) -> Metric:
-    """The metric of a column of missions of at most this length, with its range.
-
-    Args:
-        column: The column.
-        slots: The longest that a mission, or what the metric measures in it, may last.
-        units: What a slot is, of missions with a data sheet.
-        uavs: The most UAVs that a mission has.
-        idle: How long nodes were idle before it, which ages begin with [slots].
-    """
-    metric = metric_of(column)
-    if not metric.horizons:
-        return metric
-    longest = metric.horizons * slots
-    if metric.grows:
-        longest += idle
-    if units and metric.is_in_sheet_unit:
-        longest *= size_of(metric.unit, units)
-    if metric.is_sum:
-        longest *= uavs
-    return replace(metric, most=longest)
-
-
 def are_years(missions: pd.DataFrame) -> bool:
     """Whether the rows of a table of missions are years with weather."""
     return WINDOWS in missions and not missions[WINDOWS].isna().all()
 
 
-def usual_metric(missions: pd.DataFrame) -> str:
-    """The column that ranks what was simulated: of missions the product, of years the age.
-
-    The collection ratio of a year tends to 1, whatever flies.
-    """
-    if are_years(missions):
-        return column_in_sheet_unit(AGE, missions)
-    return PRODUCT
-
-
-def metric_of_years(metric: Metric) -> Metric:
-    """The same metric of years with weather, of which each has hundreds of missions.
-
-    An outcome is the share of its windows, and no rare year lies far from all others.
-    """
-    if metric.is_outcome:
-        metric = replace(metric, kind="share")
-    return replace(metric, fails=False, failure=0.0, is_of_years=True)
-
-
 def without_nodes(missions: pd.DataFrame) -> pd.DataFrame:
     """A table of missions without the columns that have a list for every mission."""
     return missions.drop(columns=[*NODES_BEHIND.values()], errors="ignore")
-
-
-def metric_in_space(column: str, space: ScenarioSpace) -> Metric:
-    """The metric of a column of missions of a scenario space, with its range and its nodes."""
-    slots = space.longest_slots
-    if metric_of(column).is_wait:
-        slots = longest_wait(space)
-    metric = metric_for_length(column, slots, space.units, space.uavs[1], space.idle_slots)
-    if space.weather.is_on:
-        metric = metric_of_years(metric)
-    if column in NODES_BEHIND:
-        return replace(metric, among=len(space.nodes))
-    return metric
-
-
-def metric_in_missions(missions: pd.DataFrame, column: str) -> Metric:
-    """The metric of a column of missions, with the range that it has in these missions.
-
-    Args:
-        missions: The missions, with the columns that ``ranges_of_missions`` needs, as the missions
-            of results have them.
-        column: The column.
-    """
-    metric = metric_of(column)
-    if not len(missions):
-        return metric
-    if are_years(missions):
-        metric = metric_of_years(metric)
-    nodes = NODES_BEHIND.get(column)
-    if nodes in missions:
-        metric = replace(metric, among=len(np.asarray(missions[nodes])[0]))
-    least, most = ranges_of_missions(missions, column)
-    return replace(metric, least=float(np.min(least)), most=float(np.max(most)))
-
-
-def metric_in_groups(
-    missions: pd.DataFrame, column: str, by: Sequence[str], groups: pd.DataFrame
-) -> Metric:
-    """The metric of a column of missions, with a range for each group of them.
-
-    Args:
-        missions: The missions, as in ``metric_in_missions``, and the columns ``by``.
-        column: The column.
-        by: The columns that tell the groups apart.
-        groups: A row per group, with these columns.
-
-    Returns:
-        The metric. The ends of its range are arrays in the order of the groups, or numbers if all
-        missions have the same.
-    """
-    metric = metric_in_missions(missions, column)
-    least, most = ranges_of_missions(missions, column)
-    if all((np.asarray(end) == np.ravel(end)[0]).all() for end in (least, most)):
-        return metric
-    ends = missions[[*by]].assign(least=least, most=most).groupby([*by], dropna=False)
-    place = pd.MultiIndex.from_frame(groups[[*by]])
-    lowest, highest = ends["least"].min(), ends["most"].max()
-    if len(by) == 1:
-        place = pd.Index(groups[by[0]])
-    return replace(
-        metric, least=lowest.reindex(place).to_numpy(), most=highest.reindex(place).to_numpy()
-    )
-
-
-def ranges_of_missions(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
-    """The least and the largest value that each mission can have of a metric.
-
-    A time may be as long as the mission (``MOST_SLOTS``), a wait as long as somebody can wait
-    (``MOST_WAITING``), and where no UAV can, there is no queue. A cost has the range of
-    ``LEAST_COST`` and ``MOST_COST``. No more data can be collected, or left, than both together.
-    No value is above what a column named ``most_`` and the metric says, as of what cannot happen.
-
-    Args:
-        missions: The missions. Of a column that they lack, nothing is known.
-        column: The column of the metric.
-
-    Returns:
-        (n,) arrays, or numbers that are those of all missions.
-    """
-    least, most = _ranges_by_metric(missions, column)
-    if (limit := limit_of(column)) in missions:
-        most = np.minimum(most, np.asarray(missions[limit], float))
-    return least, most
-
-
-def limit_of(column: str) -> str:
-    """The column of the largest value that a metric can have in each mission, if there is one."""
-    return f"most_{column}"
-
-
-def _ranges_by_metric(missions: pd.DataFrame, column: str) -> tuple[Any, Any]:
-    """The least and the largest value of a metric by its kind, as ``ranges_of_missions``."""
-    metric = metric_of(column)
-    if metric.kind == "cost" and MOST_COST in missions:
-        return np.asarray(missions[LEAST_COST]), np.asarray(missions[MOST_COST])
-    if column in _DATA_KEPT:
-        parts = _DATA_KEPT[column]
-        if all(part in missions for part in parts):
-            most = sum(np.asarray(missions[part]) for part in parts)
-            if column in (_PER_UAV, _IN_SHEET_UNIT[_PER_UAV]):
-                most = most / np.asarray(missions["uavs"])
-            return metric.range[0], most
-    if column == QUEUE and MOST_WAITING in missions:
-        return metric.range[0], np.where(np.asarray(missions[MOST_WAITING]) > 0, inf, 0.0)
-    if not metric.horizons:
-        return metric.range
-    longest, idle = metric_of(MOST_SLOTS), metric_of(IDLE)
-    if metric.is_wait and MOST_WAITING in missions:
-        longest = metric_of(MOST_WAITING)
-    if metric.is_in_sheet_unit:
-        longest, idle = longest.in_units, idle.in_units
-    if longest.column not in missions or (metric.is_sum and "uavs" not in missions):
-        return metric.range
-    most = metric.horizons * np.asarray(missions[longest.column], float)
-    if metric.grows and idle.column in missions:
-        most += np.asarray(missions[idle.column])
-    if metric.is_in_sheet_unit:
-        most *= _UNITS[longest.unit][1] / _UNITS[metric.unit][1]
-    if metric.is_sum:
-        most *= np.asarray(missions["uavs"])
-    return metric.range[0], most
 
 
 def in_either(*columns: str) -> list[str]:
@@ -598,7 +428,7 @@ def columns_in_units(missions: Mapping[str, Any], units: Units) -> dict[str, Any
 
 def size_of(unit: str, units: Units) -> float:
     """A slot, a data unit or a cell in a unit of time, data or length."""
-    quantity, size = _UNITS[unit]
+    quantity, size = SHEET_UNITS[unit]
     return getattr(units, quantity) / size
 
 
@@ -614,102 +444,3 @@ def format_length(slots: int, units: Units | None) -> str:
     if units:
         return printed(slots * units.slot, "s")
     return f"{slots} mission slots"
-
-
-def measured_in(missions: Container[str]) -> list[str]:
-    """The numbers beyond the paper that a table of missions, or a row of it, has.
-
-    Those in units of a data sheet come in the place of those in slots and data units.
-    """
-    return [
-        column_in_sheet_unit(name, missions)
-        for name in metric_group("operations")
-        if name in missions
-    ]
-
-
-def metrics_in(missions: Container[str]) -> list[str]:
-    """The metrics that a table of missions has: those of the paper, then all others."""
-    others = [column for column in metric_group("home", "bounds") if column in missions]
-    others = [column_in_sheet_unit(column, missions) for column in others]
-    return [*metric_group("paper", "reward"), *others, *measured_in(missions)]
-
-
-def told_metrics(missions: Container[str]) -> list[str]:
-    """The metrics that can be told of missions: those that they have, then their cost."""
-    costs = [column for column in metric_group("prices") if column in missions]
-    return [*metrics_in(missions), *costs]
-
-
-def check_metric(metric: str, missions: Container[str]) -> None:
-    """Refuse a metric that these missions do not have.
-
-    Raises:
-        InputError: If they do not have it.
-    """
-    metrics = told_metrics(missions)
-    if metric not in metrics:
-        raise unknown_name("metric", f"{metric!r} is unknown", metric, metrics)
-
-
-def check_ranking_metric(metric: str, missions: Container[str]) -> None:
-    """Refuse a metric by which these missions cannot be ranked.
-
-    Raises:
-        InputError: If they do not have it, or more of it is neither better nor worse.
-    """
-    check_metric(metric, missions)
-    refuse_neutral(metric)
-
-
-def refuse_neutral(metric: str, where: str = "metric") -> None:
-    """Refuse a metric that ranks nothing.
-
-    Args:
-        metric: The metric.
-        where: What names it, for messages.
-
-    Raises:
-        InputError: If more of it is neither better nor worse.
-    """
-    if metric_of(metric).is_neutral:
-        problem = f"more of {metric_of(metric).within} is neither better nor worse"
-        raise InputError(where, problem, "a metric that ranks settings, such as the product")
-
-
-def ranking_column(metric: str, missions: Container[str]) -> str:
-    """The column of a metric by which missions are ranked, in the unit of a data sheet if possible.
-
-    Raises:
-        InputError: If the missions do not have it.
-    """
-    column = column_in_sheet_unit(metric, missions)
-    check_ranking_metric(column, missions)
-    return column
-
-
-def longest_wait(space: ScenarioSpace) -> int:
-    """The most slots that a UAV may wait for a pad: none where each zone has pads for all UAVs."""
-    failures = space.failures
-    may_fail = failures.pad_rate > 0 or any(failures.pad_rates)
-    if may_fail or min(space.zone_pads) < space.uavs[1]:
-        return space.longest_slots
-    return 0
-
-
-def metrics_of_scenario(space: ScenarioSpace) -> list[str]:
-    """The metrics of the missions of a scenario, as they are measured."""
-    of_nodes = [LEAST, OLDEST] if space.units else []
-    measured = [*_measured_always(), *measures_of(space), *of_nodes]
-    return metrics_in([*metric_group("home"), *measured])
-
-
-def recorded_metrics() -> list[str]:
-    """The metrics that the record of every mission has, in the order in which means are listed."""
-    of_all = metric_group("home", "paper", "reward")
-    return [*dict.fromkeys((SUCCESS, *of_all, *_measured_always()))]
-
-
-def _measured_always() -> list[str]:
-    operations = metric_group("operations")
-    return [name for name in MISSION_RECORD.names or () if name in operations]

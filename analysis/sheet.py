@@ -65,7 +65,8 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
         *type_sentences(space),
         _rates_in_words(facts),
         _messages_in_words(facts),
-        f"a UAV flies up to {printed(facts['reach_m'], 'm')} along a line, and back",
+        f"a UAV flies up to {printed(facts['reach_m'], 'm')} along a line, and back"
+        f"{_in_still_air(space)}",
         *reach_sentences(space),
     ]
     if facts["assumed"]:
@@ -76,7 +77,13 @@ def sheet_lines(space: ScenarioSpace) -> list[str]:
 
 def battery_sentence(space: ScenarioSpace) -> str:
     """What a slot takes of the battery."""
-    return f"a slot of flight takes {_spans_in_words(_battery_per_slot(space))}"
+    spans = _spans_in_words(_battery_per_slot(space))
+    return f"a slot of flight takes {spans}{_in_still_air(space)}"
+
+
+def _in_still_air(space: ScenarioSpace) -> str:
+    """That what is told does not hold for the wind of hourly weather; empty without it."""
+    return ", in still air" if space.weather.is_on else ""
 
 
 def _spans_in_words(battery_per_slot: dict[str, float]) -> str:

@@ -120,6 +120,22 @@ def comparison_cells(rows: pd.DataFrame, of: str) -> pd.DataFrame:
     return shown.reset_index(names=of.capitalize())
 
 
+def most_widened(rows: pd.DataFrame) -> pd.Series | None:
+    """The difference whose interval the allowance for failures makes wider by most.
+
+    Args:
+        rows: Rows of ``dess.analysis.compare``.
+
+    Returns:
+        Its row with ``half``, half the length of its interval; None if none becomes much wider.
+    """
+    halves = (rows["high"] - rows["low"]) / 2
+    wider = rows.assign(half=halves)[halves > WIDER * rows["student"]]
+    if wider.empty:
+        return None
+    return wider.loc[(wider["half"] / wider["student"].clip(lower=1e-12)).idxmax()]
+
+
 def allowance_sentence(what: str, plain: str, wide: str, n: int) -> str:
     """That intervals allow for failures that the missions do not show, with an example.
 

@@ -55,6 +55,7 @@ class Fault(NamedTuple):
 
 
 RULES, CHANNEL = "dess/model/rules.py", "dess/model/channel.py"
+LINK = "dess/model/link.py"
 CHARGING, AGE, ENERGY = "dess/physics/charging.py", "dess/physics/age.py", "dess/physics/energy.py"
 BATTERY, MOVES = "dess/model/guard/battery.py", "dess/model/guard/moves.py"
 MATCHING = "dess/model/guard/matching.py"
@@ -124,13 +125,13 @@ FAULTS = (
     # Channel.
     Fault(
         "the altitude is left out of the distance",
-        CHANNEL,
+        LINK,
         "distance = hypot(horizontal, link.altitude)",
         "distance = hypot(horizontal, 0.0)",
     ),
     Fault(
         "a path loss that is a fifth too small",
-        CHANNEL,
+        LINK,
         "loss = 10 * link.path_loss_exponent",
         "loss = 8 * link.path_loss_exponent",
     ),

@@ -52,6 +52,8 @@ ROOMS = {
             "numbers",
             "names",
             "metrics",
+            "metric_ranges",
+            "measured",
             "facts",
             "sheet",
             "weather",

@@ -39,7 +39,7 @@ ALLOWED = {
     # A library that opens a file which the door has checked, or a temporary one of the door.
     "dess.policies.learner.arrays": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},
-    "dess.reports.cli.simulate": {"savefig"},
+    "dess.reports.cli.mission_files": {"savefig"},
     "dess.reports.player": {"saving"},
     # The null device in the place of a closed stream; the licence of the package.
     "dess.reports.cli.console": {"open"},

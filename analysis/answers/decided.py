@@ -7,10 +7,8 @@ from dess.analysis.answers.fleet.cheapest import search_of
 from dess.analysis.answers.policies.performance import _ENDS
 from dess.analysis.answers.settings.points import points_in_words
 from dess.analysis.answers.summary import means_of_points
-from dess.analysis.metrics import (
-    metric_of,
-    ranking_column,
-)
+from dess.analysis.measured import ranking_column
+from dess.analysis.metrics import metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (

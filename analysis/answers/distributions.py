@@ -4,10 +4,7 @@ import numpy as np
 import pandas as pd
 
 from dess.analysis import numbers
-from dess.analysis.metrics import (
-    PRODUCT,
-    metric_of,
-)
+from dess.analysis.metrics import PRODUCT, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.distribution import distribution
 from dess.analysis.tables import (

@@ -17,15 +17,9 @@ from dess.analysis.answers.settings.figures import plot_curves
 from dess.analysis.answers.settings.points import values_of_points, varied_values
 from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.figures.missions import plot_courses
-from dess.analysis.metrics import (
-    AGE,
-    PRODUCT,
-    RATIO,
-    SUCCESS,
-    check_metric,
-    metric_in_groups,
-    metric_of,
-)
+from dess.analysis.measured import check_metric
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.names import value_text
 from dess.analysis.results.event_log import mission_length
 from dess.analysis.results.tables import Results
@@ -42,7 +36,7 @@ from dess.analysis.stats.verdict import (
     judge_intervals,
 )
 from dess.analysis.stats.weights import by_replication
-from dess.analysis.tables import WIDER, allowance_sentence
+from dess.analysis.tables import allowance_sentence, most_widened
 
 # The published changes of the average age of information, from one UAV to this number, in another
 # model of the same kind (Mathematics 13(21) 3564).
@@ -156,13 +150,11 @@ def allowance_in_words(changes: pd.DataFrame, what: str) -> str:
         what: What has changed, in words.
 
     Returns:
-        Sentences with the change of the widest interval; empty if there is hardly an allowance.
+        Sentences with the change that becomes wider by most; empty if none becomes much wider.
     """
-    halves = (changes["high"] - changes["low"]) / 2
-    wider = changes.assign(half=halves)[halves > WIDER * changes["student"]]
-    if wider.empty:
+    row = most_widened(changes)
+    if row is None:
         return ""
-    row = wider.loc[wider["half"].idxmax()]
     plain, wide = (f"±{100 * row[half]:.2g} points" for half in ("student", "half"))
     return allowance_sentence(
         f"the change of {what} with {row['policy']}", plain, wide, int(row["n"])

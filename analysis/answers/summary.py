@@ -7,11 +7,8 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.policies.ranks import best_policy
-from dess.analysis.metrics import (
-    PRODUCT,
-    metric_in_groups,
-    metric_of,
-)
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import PRODUCT, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.alternatives import ONLY, judge_alternatives
 from dess.analysis.stats.groups import summary

@@ -6,11 +6,7 @@ import pandas as pd
 
 from dess.analysis import numbers
 from dess.analysis.answers.settings.points import points_in_words
-from dess.analysis.metrics import (
-    PRODUCT,
-    RATIO,
-    metric_group,
-)
+from dess.analysis.metrics import PRODUCT, RATIO, metric_group
 from dess.analysis.results.tables import Results
 from dess.analysis.tables import (
     Table,

@@ -23,7 +23,8 @@ from dess.analysis.answers.settings.ranking import (
     ranked_table,
     ranking_metric,
 )
-from dess.analysis.answers.variation import VARIATION, Variation, best_policy_of_side
+from dess.analysis.answers.sides import VARIATION, best_policy_of_side
+from dess.analysis.answers.variation import Variation
 from dess.analysis.ask import around
 from dess.analysis.ask.around import one_more_facts
 from dess.analysis.ask.assumptions import assumption_facts
@@ -308,7 +309,7 @@ class VariationAnswer(Answer):
         return [*self.variation.facts(), *setting_fall_facts(self.results)]
 
     def table(self) -> pd.DataFrame:
-        """The differences, a row per policy and metric, as ``answers.variation.compare_sides``."""
+        """The differences, a row per policy and metric, as ``answers.sides.compare_sides``."""
         return self.variation.table()
 
     def shown_tables(self) -> list[Table]:

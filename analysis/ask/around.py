@@ -47,7 +47,8 @@ from dess.scenario.weather.hours import State, hours_of
 
 FLEET = "the fleet"  # as it is, in tables and figures of its changes
 _ADDED = {"uavs": "one more UAV", "data_sheet.spares": "one more spare UAV"}
-_OPERATING, _LIMITS, _CRUISE = "weather.operating", "weather.limits", "data_sheet.cruise"
+_OPERATING, _LIMITS, _CALM = "weather.operating", "weather.limits", "weather.calm"
+_CRUISE = "data_sheet.cruise"
 YEARS = 4  # of every change at most: differences on the same years settle in a few
 _SPEEDS = (0.8, 1.25)  # slower and faster, as multiples of the cruising speed
 
@@ -138,6 +139,7 @@ def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     yield {"data_sheet.spares": space.data_sheet.spares + 1}
     if space.weather.operating != ALWAYS:
         yield {_OPERATING: ALWAYS}
+    yield {_CALM: True}
     for name in space.weather.limits:
         yield {_LIMITS: {kept: v for kept, v in space.weather.limits.items() if kept != name}}
     cruise = space.data_sheet.number("cruise")
@@ -349,6 +351,8 @@ def change_in_words(space: ScenarioSpace, change: dict[str, Any]) -> str:
     ((field, value),) = change.items()
     if field == _OPERATING:
         return "flights round the clock"
+    if field == _CALM:
+        return "still air"
     if field == _LIMITS:
         (removed,) = space.weather.limits.keys() - value
         return f"no limit of {removed}"

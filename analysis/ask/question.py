@@ -25,16 +25,8 @@ from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
 from dess.analysis.execution.runner import Round, run_study
-from dess.analysis.metrics import (
-    AGE,
-    ALIASES,
-    LATE,
-    LEAST,
-    METRICS,
-    OLDEST,
-    column_in_sheet_unit,
-    refuse_neutral,
-)
+from dess.analysis.measured import refuse_neutral
+from dess.analysis.metrics import AGE, ALIASES, LATE, LEAST, METRICS, OLDEST, column_in_sheet_unit
 from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of

@@ -22,15 +22,9 @@ from dess.analysis.execution.jobs import (
     simulate_missions,
 )
 from dess.analysis.execution.workers import Here, Pool
-from dess.analysis.metrics import (
-    METRICS,
-    NODES_BEHIND,
-    WINDOWS,
-    columns_in_units,
-    measured_in,
-    metric_in_space,
-    recorded_metrics,
-)
+from dess.analysis.measured import measured_in, recorded_metrics
+from dess.analysis.metric_ranges import metric_in_space
+from dess.analysis.metrics import METRICS, NODES_BEHIND, WINDOWS, columns_in_units
 from dess.analysis.results.chunks import split_into_chunks
 from dess.analysis.results.manifest import Cell, CellPart
 from dess.analysis.results.parquet import columns_of_nodes

@@ -27,7 +27,8 @@ from dess.analysis.execution.jobs import (
 from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import chunks, tables
 from dess.analysis.results.manifest import CellPart, Selected
-from dess.analysis.results.store import Failure, Present, Store, gaps_between, source_folders
+from dess.analysis.results.replications import Present, gaps_between
+from dess.analysis.results.store import Failure, Store, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.stopping import Samples

@@ -49,7 +49,7 @@ def plot_sides(table: pd.DataFrame, metric: str, sides: Sequence[str]) -> Figure
     """A metric of every policy in the baseline and in the variation, with intervals.
 
     Args:
-        table: Rows of ``answers.variation.means_of_sides``.
+        table: Rows of ``answers.sides.means_of_sides``.
         metric: One of their metrics.
         sides: The texts below the baseline and the variation.
     """
@@ -70,7 +70,7 @@ def plot_gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``answers.variation.compare_sides``; the way home is shown if they have it.
+        answers: Rows of ``answers.sides.compare_sides``; the way home is shown if they have it.
     """
     names = METRICS | {HOME: "Battery for\nthe way home"}
     rows = answers[answers["metric"].isin([*names])]
@@ -81,7 +81,7 @@ def plot_difference_spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: For each policy the result of ``answers.variation.paired_differences``.
+        differences: For each policy the result of ``answers.sides.paired_differences``.
     """
     with style.new_panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")

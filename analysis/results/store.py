@@ -12,7 +12,7 @@ or by how many workers it was computed, but for ``derived/``.
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from itertools import groupby
@@ -25,19 +25,15 @@ import pyarrow as pa
 
 from dess import InputError
 from dess.analysis.bound import Bound
+from dess.analysis.metric_ranges import longest_wait
 from dess.analysis.metrics import (
     COST,
     IDLE,
-    LEAST,
     LEAST_COST,
     MOST_COST,
     MOST_SLOTS,
     MOST_WAITING,
-    NODE_AGES,
-    NODE_RATIOS,
-    OLDEST,
     columns_in_units,
-    longest_wait,
 )
 from dess.analysis.results import chunks, parquet
 from dess.analysis.results.derived import Derived
@@ -49,7 +45,8 @@ from dess.analysis.results.manifest import (
     Manifest,
     Selected,
 )
-from dess.analysis.stats.worst_node import worst_node
+from dess.analysis.results.replications import Present, absent_parts, gaps_between, joined_ranges
+from dess.analysis.results.rows import rows_of, stack_tables, tables_of, with_worst_nodes
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import CHECK, Study
 from dess.base.files.reading import paths_in
@@ -70,7 +67,6 @@ _BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
 TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
 
 Place = tuple[int, int]  # a design point and a replication
-Present = defaultdict[str, list[range]]  # replications by the key of their cell
 
 
 class Count(NamedTuple):
@@ -329,7 +325,7 @@ class Store:
             kind: ``missions``, ``bounds`` or ``events``.
             parts: The parts.
         """
-        return _absent_parts(parts, self._present[kind])
+        return absent_parts(parts, self._present[kind])
 
     def begun(self, team: int) -> list[CellPart]:
         """The missions that every cell of a team has, up to the first one that it lacks."""
@@ -390,7 +386,7 @@ class Store:
                 except InputError:
                     return
                 chunk = chunks.Chunk(team, tuple(shared))
-                (tables,) = _tables_of([chunk], frames)
+                (tables,) = tables_of([chunk], frames)
                 self.keep("missions", chunk, tables)
 
     def merge(self, large: Sequence[chunks.Chunk]) -> None:
@@ -407,9 +403,9 @@ class Store:
         if large_files.keys() == names:
             return
         new = [chunk for chunk in large if chunk.name not in large_files]
-        for chunk, tables in zip(new, _tables_of(new, self._frames(parts)), strict=True):
+        for chunk, tables in zip(new, tables_of(new, self._frames(parts)), strict=True):
             self.keep("missions", chunk, tables)
-        merged = _joined_ranges(parts)
+        merged = joined_ranges(parts)
         gone = {
             name
             for name, of_file in large_files.items()
@@ -433,7 +429,7 @@ class Store:
         missing: Present = defaultdict(list)
         for part in self.missing("missions", parts):
             missing[part.cell.key].append(part.replications)
-        return _absent_parts(parts, missing)
+        return absent_parts(parts, missing)
 
     def write_failure(self, chunk: chunks.Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
@@ -469,7 +465,7 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        missions = _with_worst_nodes(self._rows("missions", parts))
+        missions = with_worst_nodes(self._rows("missions", parts))
         spaces = self.manifest.scenarios
         points = missions["point"].to_numpy()
         missions[MOST_SLOTS] = np.array([space.longest_slots for space in spaces])[points]
@@ -568,125 +564,6 @@ class Store:
         """The event log of a replication of a cell, if it is present."""
         path = self._logs.get((cell.key, replication))
         return parquet.read(path) if path else None
-
-
-def _with_worst_nodes(missions: pd.DataFrame) -> pd.DataFrame:
-    """The missions with the value of the node that is the worst at their design point.
-
-    Without data sheets, and where an earlier version has simulated some of them, there is none.
-    """
-    for metric, nodes in ((LEAST, NODE_RATIOS), (OLDEST, NODE_AGES)):
-        if nodes not in missions:
-            continue
-        if missions[nodes].isna().any():
-            missions = missions.drop(columns=nodes)
-            continue
-        worst = np.empty(len(missions))
-        for rows in missions.reset_index(drop=True).groupby("point").indices.values():
-            by_node = np.stack(missions[nodes].to_numpy()[rows])
-            worst[rows] = by_node[:, worst_node(by_node.mean(axis=0), metric)]
-        missions[metric] = worst
-    return missions
-
-
-def gaps_between(wanted: range, present: list[range]) -> list[range]:
-    """The parts of a range that are in none of the present ranges."""
-    missing = []
-    begin = wanted.start
-    for part in sorted(present, key=lambda r: r.start):
-        if part.start > begin:
-            missing.append(range(begin, min(part.start, wanted.stop)))
-        begin = max(begin, part.stop)
-        if begin >= wanted.stop:
-            break
-    return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
-
-
-def _absent_parts(parts: Iterable[CellPart], present: Present) -> list[CellPart]:
-    """What of some parts is not present."""
-    return [
-        CellPart(p.cell, gap)
-        for p in parts
-        for gap in gaps_between(p.replications, present[p.cell.key])
-    ]
-
-
-def _joined_ranges(parts: Iterable[CellPart]) -> Present:
-    """The replications of each cell, by its key, in as few ranges as there are between gaps."""
-    joined: Present = defaultdict(list)
-    for part in sorted(parts, key=lambda part: part.replications.start):
-        ranges = joined[part.cell.key]
-        if ranges and part.replications.start <= ranges[-1].stop:
-            ranges[-1] = range(ranges[-1].start, max(ranges[-1].stop, part.replications.stop))
-        else:
-            ranges.append(part.replications)
-    return joined
-
-
-def rows_of(parts: Sequence[CellPart], stacked: pd.DataFrame) -> pd.DataFrame:
-    """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
-
-    Args:
-        parts: The parts.
-        stacked: The rows of these missions, and of others, as ``stack_tables`` returns them.
-    """
-    rows = _keys_of(parts).merge(stacked, on=["cell", "replication"], how="left")
-    return rows[["point", *stacked]]
-
-
-def _keys_of(parts: Sequence[CellPart]) -> pd.DataFrame:
-    """The ``point``, ``cell`` and ``replication`` of every mission of the parts."""
-    lengths = [len(part.replications) for part in parts]
-    return pd.DataFrame(
-        {
-            "point": np.repeat([part.cell.point for part in parts], lengths),
-            "cell": np.repeat([part.cell.key for part in parts], lengths),
-            "replication": np.concatenate([part.replications for part in parts]),
-        }
-    )
-
-
-def stack_tables(tables: Sequence[pa.Table]) -> pd.DataFrame:
-    """The rows of all tables; nan in columns that only others of them have.
-
-    Args:
-        tables: Tables with the columns ``cell`` and ``replication``.
-
-    Raises:
-        InputError: If two tables have different rows for the same mission.
-    """
-    frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
-    key = [name for name in ("cell", "replication", "uav") if name in frame]
-    if frame.duplicated(key).any():  # such as after files of two folders were merged
-        hashable = frame.map(lambda v: v.tobytes() if isinstance(v, np.ndarray) else v)
-        frame = frame[~hashable.duplicated()]
-        if frame.duplicated(key).any():
-            raise InputError(
-                "results", "two files have different records of a mission", "one of them"
-            )
-    return frame
-
-
-def _tables_of(
-    of_files: Sequence[chunks.Chunk], frames: Iterable[pd.DataFrame]
-) -> Iterator[list[pa.Table]]:
-    """The tables of chunks, from frames that have their missions and UAVs among others.
-
-    The rows of all chunks are found at once, since to find those of one takes as long.
-    """
-    if not of_files:
-        return
-    keys = _keys_of([part for chunk in of_files for part in chunk.parts])
-    keys["chunk"] = np.repeat(range(len(of_files)), [chunk.missions for chunk in of_files])
-    of_frames = []
-    for frame in frames:
-        rows = keys.merge(frame, on=["cell", "replication"], how="left")
-        ends = np.searchsorted(rows["chunk"], range(len(of_files) + 1))
-        of_frames.append((rows[[*frame]], ends))
-    for number, chunk in enumerate(of_files):
-        parts = (rows.iloc[ends[number] : ends[number + 1]] for rows, ends in of_frames)
-        columns = ({str(name): part[name].to_numpy() for name in part} for part in parts)
-        yield parquet.tables_with(chunk, *columns)
 
 
 def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:

@@ -12,6 +12,8 @@ nothing. To find that missions which never fail have a success of 0.99, within 0
 error of 5 %, it takes 318 of them, and the stakes of a sequence 435.
 """
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 from scipy.special import stdtrit
 
@@ -73,8 +75,8 @@ class _Bets:
         return first_win(self._capitals, self._stakes, self._bound, values, self._target)
 
 
-class MeanTest:
-    """A sequential test of whether a mean meets a requirement; the first verdict is final.
+class RequirementTest(ABC):
+    """A test of whether a mean meets a requirement; the first verdict is final.
 
     Attributes:
         required: The least mean.
@@ -82,23 +84,36 @@ class MeanTest:
         missions: Number of values observed up to the verdict; all values if it is open.
     """
 
-    def __init__(
-        self, required: float, tolerance: float, error: float, error_of_miss: float | None = None
-    ):
+    def __init__(self, required: float, tolerance: float, error: float):
         """Begin a test.
 
         Args:
             required: The least mean.
             tolerance: How far from it either verdict is right.
             error: The largest probability of each wrong verdict.
-            error_of_miss: That of the verdict ``MISSED``, if it has another one.
         """
         self.required = required
+        self.verdict = Verdict.OPEN
+        self.missions = 0
+        self._tolerance = tolerance
+        self._error = error
+
+    @abstractmethod
+    def observe(self, values: np.ndarray) -> None:
+        """Take more values into account, in the order of their replications."""
+
+
+class MeanTest(RequirementTest):
+    """A sequential test of whether a mean meets a requirement, by bets."""
+
+    def __init__(
+        self, required: float, tolerance: float, error: float, error_of_miss: float | None = None
+    ):
+        """Begin a test; ``error_of_miss`` is the error of ``MISSED``, if it has another one."""
+        super().__init__(required, tolerance, error)
         self._above = _Bets(required - tolerance, True, tolerance, error)
         self._below = _Bets(required + tolerance, False, tolerance, error_of_miss or error)
         self._total = 0.0
-        self.verdict = Verdict.OPEN
-        self.missions = 0
 
     def observe(self, values: np.ndarray) -> None:
         """Take more values into account, in the order of their replications."""
@@ -116,21 +131,12 @@ class MeanTest:
             self.verdict = judge_facts(kept == first, broken == first, margin)
 
 
-class YearsTest:
+class YearsTest(RequirementTest):
     """A test of whether a mean meets a requirement, by all values at once.
 
     There are far too few years for bets. So the interval is Student's, which holds once: for
     values that are observed in one part. Of the (n, K) values of nodes, the worst one counts.
-
-    Attributes:
-        required, verdict, missions: As of a ``MeanTest``.
     """
-
-    def __init__(self, required: float, tolerance: float, error: float):
-        self.required = required
-        self.verdict = Verdict.OPEN
-        self.missions = 0
-        self._limits = tolerance, error
 
     def observe(self, values: np.ndarray) -> None:
         """Take all values into account, in the order of their replications."""
@@ -138,32 +144,27 @@ class YearsTest:
             return
         self.missions = len(values)
         by_node = values.reshape(len(values), -1)
-        tolerance, error = self._limits
         means, deviations = by_node.mean(axis=0), by_node.std(axis=0, ddof=1)
-        one_sided = [1 - error, 1 - error / by_node.shape[1]]
+        one_sided = [1 - self._error, 1 - self._error / by_node.shape[1]]
         below, above = stdtrit(len(values) - 1, one_sided) / np.sqrt(len(values))
-        is_met = bool((means - below * deviations > self.required - tolerance).all())
-        is_missed = bool((means + above * deviations < self.required + tolerance).any())
+        least = self.required - self._tolerance
+        most = self.required + self._tolerance
+        is_met = bool((means - below * deviations > least).all())
+        is_missed = bool((means + above * deviations < most).any())
         self.verdict = judge_facts(is_met, is_missed, float(means.min()) - self.required)
 
 
-class WorstNodeTest:
+class WorstNodeTest(RequirementTest):
     """A sequential test of whether the means of all nodes meet a requirement.
 
     It is met once each node has been found to meet it. That is wrong only if it is wrong of the
     worst node, so the test of every node has the whole error (an intersection-union test: R. L.
     Berger, Technometrics 24 (1982) 295-300). It is missed once a node has been found to miss it,
     for which the nodes share the error.
-
-    Attributes:
-        required, verdict, missions: As of a ``MeanTest``.
     """
 
     def __init__(self, required: float, tolerance: float, error: float):
-        self.required = required
-        self.verdict = Verdict.OPEN
-        self.missions = 0
-        self._limits = tolerance, error
+        super().__init__(required, tolerance, error)
         self._tests: list[MeanTest] = []
 
     def observe(self, values: np.ndarray) -> None:
@@ -171,9 +172,9 @@ class WorstNodeTest:
         if self.verdict != Verdict.OPEN or not len(values):
             return
         nodes = values.shape[1]
-        tolerance, error = self._limits
         self._tests = self._tests or [
-            MeanTest(self.required, tolerance, error, error / nodes) for _ in range(nodes)
+            MeanTest(self.required, self._tolerance, self._error, self._error / nodes)
+            for _ in range(nodes)
         ]
         for test, of_node in zip(self._tests, values.T, strict=True):
             test.observe(of_node)

@@ -11,7 +11,8 @@ import scipy
 from scipy.special import stdtr
 
 from dess import InputError
-from dess.analysis.metrics import REWARD, Metric, metric_group, metric_in_groups, metric_of
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import REWARD, Metric, metric_group, metric_of
 from dess.analysis.stats.intervals import Interval, mean_interval
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.rows import check_columns, check_share, group_rows
@@ -100,7 +101,7 @@ def metrics_by_group(
     """Each metric with the range that it has in each group of missions.
 
     Args:
-        missions: The missions, as ``metrics.metric_in_missions`` takes them.
+        missions: The missions, as ``metric_ranges.metric_in_missions`` takes them.
         metrics: The metrics.
         by: The columns whose values form the groups; without any, all missions are one.
 

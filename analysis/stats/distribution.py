@@ -8,7 +8,7 @@ import pandas as pd
 import scipy
 
 from dess import InputError
-from dess.analysis.metrics import metric_in_missions
+from dess.analysis.metric_ranges import metric_in_missions
 from dess.analysis.stats.bootstrap import bootstrap_interval, expanded_level
 from dess.analysis.stats.intervals import Interval, interval_of
 from dess.analysis.stats.kinds import LEVEL

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from dess.analysis.metrics import Metric, metric_in_missions, metrics_in
+from dess.analysis.measured import metrics_in
+from dess.analysis.metric_ranges import metric_in_missions
+from dess.analysis.metrics import Metric
 from dess.analysis.stats.intervals import Interval, interval_of, stratified_interval
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.rows import group_rows

@@ -6,7 +6,8 @@ from functools import reduce
 import numpy as np
 import pandas as pd
 
-from dess.analysis.metrics import NODES_BEHIND, metric_in_missions
+from dess.analysis.metric_ranges import metric_in_missions
+from dess.analysis.metrics import NODES_BEHIND
 from dess.analysis.stats.intervals import Moments
 from dess.analysis.stats.rows import group_rows
 from dess.analysis.stats.worst_node import worst_of_nodes

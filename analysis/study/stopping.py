@@ -15,7 +15,8 @@ from pydantic import (
 )
 
 from dess import InputError
-from dess.analysis.metrics import NODES_BEHIND, Metric, metric_group, metric_in_missions, metric_of
+from dess.analysis.metric_ranges import metric_in_missions
+from dess.analysis.metrics import NODES_BEHIND, Metric, metric_group, metric_of
 from dess.analysis.stats.kinds import LEVEL, Sample, ends_of_means, skewness_of
 from dess.analysis.stats.worst_node import worst_and_spread
 from dess.base.errors import listed, shown, to_input_error, unknown_name

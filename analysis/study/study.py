@@ -22,15 +22,8 @@ from pydantic import (
 
 from dess import InputError
 from dess.analysis.bound import check_scenario
-from dess.analysis.metrics import (
-    BOUND,
-    COST,
-    GAP,
-    metric_of,
-    metrics_of_scenario,
-    refuse_neutral,
-    told_metrics,
-)
+from dess.analysis.measured import metrics_of_scenario, refuse_neutral, told_metrics
+from dess.analysis.metrics import BOUND, COST, GAP, metric_of
 from dess.analysis.study.cheapest import AnySelection, Cheapest
 from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
 from dess.analysis.study.prices import Costs

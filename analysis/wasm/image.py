@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.analysis.metrics import metric_for_length, metric_of, size_of
+from dess.analysis.metric_ranges import metric_for_length
+from dess.analysis.metrics import metric_of, size_of
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.sequences import SEQUENCE
 from dess.analysis.study.prices import Costs, full_packs_of, has_priced_types

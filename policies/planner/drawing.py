@@ -14,13 +14,13 @@ from dess.model.mission import Mission, simulate
 from dess.model.view import View, decide
 from dess.policies.planner.fluid import (
     MOST_SLOTS,
-    Plan,
     begin_flight,
     empty_flight,
     simulate_flight,
 )
 from dess.policies.planner.policy import Planner, recall_plans
 from dess.policies.planner.rates import RATES_PART, load_rates
+from dess.policies.planner.waypoints import Plan
 from dess.scenario.scenario import Scenario, ScenarioSpace
 
 

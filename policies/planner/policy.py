@@ -25,6 +25,14 @@ from dess.policies.heuristics import step_towards
 from dess.policies.planner import fluid
 from dess.policies.planner.rates import RATES_PART, load_rates
 from dess.policies.planner.search import TRIED, empty_workspace, improve_plan
+from dess.policies.planner.waypoints import (
+    CHARGE,
+    MOST_WAYPOINTS,
+    WAYPOINT,
+    Plan,
+    insert_waypoint,
+    remove_waypoint,
+)
 
 # The temperature of the first step of a search [data units]: for a new plan, and for one that is
 # improved.
@@ -135,7 +143,7 @@ def recall_plans(state: State, budget: Budget) -> Memory:
     if key not in _MEMORIES:
         memory = Memory(
             np.zeros((len(missions), 3), np.uint64),
-            np.zeros((*shape, fluid.MOST_WAYPOINTS + 1), fluid.WAYPOINT),
+            np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
             np.zeros(shape, np.int64),
             np.zeros(shape, fluid.CRAFT),
             np.zeros_like(state.residual),
@@ -160,7 +168,7 @@ def _choose_actions(
         mission = missions[b]
         team = uavs[b]
         planned_for = memory.made[b]
-        plan = fluid.Plan(memory.waypoints[b], memory.lengths[b])
+        plan = Plan(memory.waypoints[b], memory.lengths[b])
         slot = np.uint64(mission.slot + 1)
         is_same = planned_for[0] == mission.seed and planned_for[1] == np.uint64(
             mission.replication
@@ -245,7 +253,7 @@ def _must_charge_here(mission, u, data, waypoints, length):
         return False
     is_planned = False
     for number in range(length):
-        is_planned = is_planned or waypoints[number].stay == fluid.CHARGE
+        is_planned = is_planned or waypoints[number].stay == CHARGE
     return not is_planned
 
 
@@ -256,7 +264,7 @@ def _write_first_plan(mission, uavs, data, chart, plan):
         plan.lengths[i] = 0
         if not lands(mission) and uavs[i].active and must_charge(mission, uavs[i], data):
             cell = chart.parking[i % len(chart.parking)]
-            fluid.insert_waypoint(plan, i, 0, cell[0], cell[1], fluid.CHARGE, 0)
+            insert_waypoint(plan, i, 0, cell[0], cell[1], CHARGE, 0)
 
 
 @kernel
@@ -272,16 +280,16 @@ def _drop_done_waypoints(mission, uavs, plan, planned):
             plan.lengths[i] = 0
             continue
         for _ in range(v.next):
-            fluid.remove_waypoint(plan, i, 0)
-        if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != fluid.CHARGE:
+            remove_waypoint(plan, i, 0)
+        if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != CHARGE:
             plan.waypoints[i, 0].stay -= v.stayed
         charge = 0
-        while charge < plan.lengths[i] and plan.waypoints[i, charge].stay != fluid.CHARGE:
+        while charge < plan.lengths[i] and plan.waypoints[i, charge].stay != CHARGE:
             charge += 1
         if charge == plan.lengths[i]:
             continue
         if u.charging and charge > 0:
-            fluid.remove_waypoint(plan, i, charge)
-            fluid.insert_waypoint(plan, i, 0, u.x, u.y, fluid.CHARGE, 0)
+            remove_waypoint(plan, i, charge)
+            insert_waypoint(plan, i, 0, u.x, u.y, CHARGE, 0)
         elif v.charging != 0 and charge == 0 and not u.charging and not u.latch:
-            fluid.remove_waypoint(plan, i, 0)
+            remove_waypoint(plan, i, 0)

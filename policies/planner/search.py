@@ -19,7 +19,19 @@ from dess.model.state import STEP_X, STEP_Y
 from dess.physics import streams
 from dess.physics.chart import distance, in_zone, is_open
 from dess.policies.planner import fluid
-from dess.policies.planner.fluid import Flight, Plan
+from dess.policies.planner.fluid import Flight
+from dess.policies.planner.waypoints import (
+    CHARGE,
+    MOST_WAYPOINTS,
+    NEVER,
+    Plan,
+    copy_plan,
+    empty_plan,
+    insert_waypoint,
+    last_charge,
+    remove_waypoint,
+    set_waypoint,
+)
 
 # The temperature [data units] falls to this in the last step.
 _COLDEST = 0.05
@@ -63,7 +75,7 @@ def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
     """Working memory for missions of at most that many slots, UAVs and nodes."""
     slots = min(slots, fluid.MOST_SLOTS)
     flight, ahead = (fluid.empty_flight(slots, uavs, nodes) for _ in range(2))
-    return Workspace(fluid.empty_plan(uavs), fluid.empty_plan(uavs), flight, ahead, np.zeros(4))
+    return Workspace(empty_plan(uavs), empty_plan(uavs), flight, ahead, np.zeros(4))
 
 
 @kernel
@@ -97,8 +109,8 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
             mission, rates, plan, flight, 0, flight, slots, np.inf
         )
         course[HEAT] = hottest
-        fluid.copy_plan(mission, plan, present)
-        fluid.copy_plan(mission, plan, trial)
+        copy_plan(mission, plan, present)
+        copy_plan(mission, plan, trial)
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
     lag = _LAG if mission.uavs > 1 else math.inf
     words = np.empty(4, np.uint64)
@@ -112,10 +124,10 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
         slot = _edit_plan(mission, uavs, nodes, rates.chart, flight, trial, words)
         if slot == _NO_EDIT:
             continue
-        if slot != fluid.NEVER:
+        if slot != NEVER:
             slot = min(slot, _first_unplanned(mission, present, trial))
         if slot >= flight.last[1]:
-            fluid.copy_plan(mission, present, trial)
+            copy_plan(mission, present, trial)
             continue
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         least = heat * log(luck)
@@ -128,12 +140,12 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
                 v = flight.team[flight.last[0], i]  # but for charges, which count as planned
                 trial.lengths[i] = min(trial.lengths[i], max(v.next, v.last_charge) + 1)
-            fluid.copy_plan(mission, trial, present)
+            copy_plan(mission, trial, present)
             if value > best:
                 best = value
-                fluid.copy_plan(mission, present, plan)
+                copy_plan(mission, present, plan)
         else:
-            fluid.copy_plan(mission, present, trial)
+            copy_plan(mission, present, trial)
     course[TRIED] = last if last < steps else 0
     course[VALUE] = value
     course[BEST] = best
@@ -144,10 +156,10 @@ def improve_plan(mission, uavs, residual, nodes, rates, plan, workspace, steps, 
 @kernel
 def _first_unplanned(mission, present, trial):
     """The first slot after the last charge of a UAV in one plan, if it is another in the other."""
-    slot = fluid.NEVER
+    slot = NEVER
     for i in range(mission.uavs):
-        charge = fluid.last_charge(present, i)
-        other_charge = fluid.last_charge(trial, i)
+        charge = last_charge(present, i)
+        other_charge = last_charge(trial, i)
         if charge != other_charge:
             slot = min(slot, present.waypoints[i, min(charge, other_charge) + 1].begun)
     return slot
@@ -192,23 +204,23 @@ def _edit_plan(mission, uavs, nodes, chart, flight, plan, words):
     w = plan.waypoints[i, p]
     slot = w.begun
     if kind == _REMOVE:
-        fluid.remove_waypoint(plan, i, p)
+        remove_waypoint(plan, i, p)
     elif kind == _TURN:
         w.turned = 1 - w.turned
     elif kind == _STAY:
-        if w.stay == fluid.CHARGE:
+        if w.stay == CHARGE:
             return _NO_EDIT
         w.stay += 1 if w.stay == 0 or _pick_number(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
         action = _pick_number(words[2], 4)
         x = w.x + STEP_X[action]
         y = w.y + STEP_Y[action]
-        if not is_open(chart.zones, x, y) or (w.stay == fluid.CHARGE and not in_zone(chart, x, y)):
+        if not is_open(chart.zones, x, y) or (w.stay == CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
         w.x = x
         w.y = y
     elif kind == _REPLACE:
-        if w.stay == fluid.CHARGE:
+        if w.stay == CHARGE:
             return _NO_EDIT
         k = _pick_number(words[2], mission.nodes)
         other = _pick_other_number(words[2], mission.nodes)
@@ -245,7 +257,7 @@ def _nearer_cell(w, one, other):
 def _move_waypoints(chart, flight, plan, i, p, j, words):
     """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
     count = min(1 + _pick_other_number(words[3], _MOST_MOVED), plan.lengths[i] - p)
-    if plan.lengths[j] + count > fluid.MOST_WAYPOINTS:
+    if plan.lengths[j] + count > MOST_WAYPOINTS:
         return _NO_EDIT
     moved = np.empty((_MOST_MOVED, 4), np.int64)
     has_charge = False
@@ -254,21 +266,21 @@ def _move_waypoints(chart, flight, plan, i, p, j, words):
         w = plan.waypoints[i, p + number]
         moved[number, 0], moved[number, 1] = w.x, w.y
         moved[number, 2], moved[number, 3] = w.stay, w.turned
-        has_charge = has_charge or w.stay == fluid.CHARGE
+        has_charge = has_charge or w.stay == CHARGE
     if has_charge and j != i:
         return _NO_EDIT
     for _ in range(count):
-        fluid.remove_waypoint(plan, i, p)
+        remove_waypoint(plan, i, p)
     q = _pick_number(words[3], plan.lengths[j] + 1)
     if not has_charge and _pick_other_number(words[2], 1 << 16) < _SHORTEST:
         q = _shortest_detour(chart, flight, plan, j, moved[0, 0], moved[0, 1])
     if j == i and q == p:
-        return fluid.NEVER
+        return NEVER
     slot = min(slot, plan.waypoints[j, q].begun)
     is_reversed = words[0] & np.uint64(1) == np.uint64(1)
     for number in range(count):
         x, y, stay, turned = moved[number]
-        fluid.insert_waypoint(plan, j, q, x, y, stay, turned)
+        insert_waypoint(plan, j, q, x, y, stay, turned)
         if not is_reversed:
             q += 1
     return slot
@@ -280,7 +292,7 @@ def _swap_between_uavs(plan, i, p, j, q):
     if q == plan.lengths[j] or (i == j and p == q):
         return _NO_EDIT
     w, other = plan.waypoints[i, p], plan.waypoints[j, q]
-    if j != i and (w.stay == fluid.CHARGE or other.stay == fluid.CHARGE):
+    if j != i and (w.stay == CHARGE or other.stay == CHARGE):
         return _NO_EDIT
     slot = min(w.begun, other.begun)
     _swap_waypoints(w, other)
@@ -295,12 +307,12 @@ def _swap_tails(plan, i, p, j, q):
     other_tail = plan.lengths[j] - q
     count = max(tail, other_tail)
     charges = 0
-    if j == i or max(p, q) + count > fluid.MOST_WAYPOINTS:
+    if j == i or max(p, q) + count > MOST_WAYPOINTS:
         return _NO_EDIT
     for number in range(tail):
-        charges += plan.waypoints[i, p + number].stay == fluid.CHARGE
+        charges += plan.waypoints[i, p + number].stay == CHARGE
     for number in range(other_tail):
-        charges -= plan.waypoints[j, q + number].stay == fluid.CHARGE
+        charges -= plan.waypoints[j, q + number].stay == CHARGE
     if charges != 0:
         return _NO_EDIT
     for number in range(count):
@@ -313,7 +325,7 @@ def _swap_tails(plan, i, p, j, q):
 @kernel
 def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
-    if plan.lengths[i] == fluid.MOST_WAYPOINTS:
+    if plan.lengths[i] == MOST_WAYPOINTS:
         return _NO_EDIT
     k = _pick_number(words[2], mission.nodes)
     other = _pick_other_number(words[2], mission.nodes)
@@ -324,9 +336,7 @@ def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     if _pick_other_number(words[0], 1 << 16) < _SHORTEST:
         p = _shortest_detour(chart, flight, plan, i, x, y)
     slot = plan.waypoints[i, p].begun
-    fluid.insert_waypoint(
-        plan, i, p, x, y, _pick_number(words[3], 3), np.int64(words[3] & np.uint64(1))
-    )
+    insert_waypoint(plan, i, p, x, y, _pick_number(words[3], 3), np.int64(words[3] & np.uint64(1)))
     return slot
 
 
@@ -337,20 +347,20 @@ def _edit_charge(mission, chart, plan, i, p, words):
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     w = plan.waypoints[i, p]
     slot = w.begun
-    if p < plan.lengths[i] and w.stay == fluid.CHARGE:
+    if p < plan.lengths[i] and w.stay == CHARGE:
         w.x = x
         w.y = y
-    elif plan.lengths[i] == fluid.MOST_WAYPOINTS or mission.flight_cost == 0:
+    elif plan.lengths[i] == MOST_WAYPOINTS or mission.flight_cost == 0:
         slot = _NO_EDIT
     else:
-        fluid.insert_waypoint(plan, i, p, x, y, fluid.CHARGE, np.int64(words[3] & np.uint64(1)))
+        insert_waypoint(plan, i, p, x, y, CHARGE, np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
 def _shortest_detour(chart, flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
-    least = fluid.NEVER
+    least = NEVER
     place = 0
     from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
@@ -369,5 +379,5 @@ def _shortest_detour(chart, flight, plan, i, x, y):
 def _swap_waypoints(one, other):
     """Swap two waypoints, but for when their legs begin."""
     x, y, stay, turned = one.x, one.y, one.stay, one.turned
-    fluid.set_waypoint(one, other.x, other.y, other.stay, other.turned)
-    fluid.set_waypoint(other, x, y, stay, turned)
+    set_waypoint(one, other.x, other.y, other.stay, other.turned)
+    set_waypoint(other, x, y, stay, turned)

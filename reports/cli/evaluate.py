@@ -58,7 +58,7 @@ def evaluate(
         compare_with_first,
         estimate_means,
     )
-    from dess.analysis.metrics import metric_in_space
+    from dess.analysis.metric_ranges import metric_in_space
     from dess.analysis.study.study import engine_of, replications_of
     from dess.model.record import measures_of
 

@@ -11,8 +11,8 @@ import typer
 from dess.base.errors import InputError, cut
 from dess.base.files.writing import fill
 from dess.reports.cli import console, options
+from dess.reports.cli.mission_files import FIGURES, save_figure
 from dess.reports.cli.options import JsonOption, SetOption, add_command, load_space
-from dess.reports.cli.simulate import FIGURES, save_figure
 
 policies = typer.Typer(invoke_without_command=True, help="List the policies, or show one.")
 scenarios = typer.Typer(

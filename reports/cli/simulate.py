@@ -14,24 +14,17 @@ import typer
 from dess.base.errors import InputError, shown, unknown_name
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption
+from dess.reports.cli.mission_files import Outputs, SimulatedMission, write_plan
 
 if TYPE_CHECKING:
-    import numpy as np
-    from matplotlib.figure import Figure
-
     from dess.analysis.flights.flight_plan import FlightPlan
     from dess.analysis.flights.separation import Separation
-    from dess.model.record import MissionRecord
     from dess.model.state import Starts
     from dess.policies.registry import Policy
     from dess.scenario.own_sea import Positions
-    from dess.scenario.scenario import Scenario, ScenarioSpace
+    from dess.scenario.scenario import ScenarioSpace
 
-LOGS = (".parquet", ".csv")
-FIGURES = (".png", ".pdf", ".svg")
-ANIMATIONS = (".gif", ".mp4", ".html")
 MOST_DISTANCE = 100  # of UAVs of a plan from each other [m]
-PATHS = (".geojson", ".kml", ".gpx", ".csv")
 # Metrics of ``--json``, between the names and the UAVs.
 JSON_METRICS = (
     *("slots", "success", "collection_ratio", "collection_ratio_and_communication"),
@@ -120,7 +113,7 @@ def simulate(
         with console.compile_notice():
             asked = asked.in_window(window)
     check_seed(asked.seed, asked.replication)
-    outputs = _Outputs(events, figure, animation, path, plan)
+    outputs = Outputs(events, figure, animation, path, plan)
     outputs.check_degrees(asked.space)
     begin = _parse_start(start, outputs)
     separation = _parse_separation(context, air_distance, ground_distance, outputs)
@@ -133,7 +126,7 @@ def simulate(
         outputs.write(mission, temporaries)
         flight_plan = None
         if folder and positions:
-            flight_plan = _write_plan(mission, positions, folder)
+            flight_plan = write_plan(mission, positions, folder)
     options.note_departures([asked.policy], [asked.space])
     if as_json:
         print(json.dumps(_make_document(asked, mission, flight_plan), indent=2))
@@ -201,67 +194,6 @@ class _Asked:
         return {name: getattr(self, name) for name in shown}
 
 
-@dataclass(frozen=True)
-class _Outputs:
-    """What a mission is written into."""
-
-    events: Path | None
-    figure: Path | None
-    animation: Path | None
-    path: Path | None
-    plan: Path | None
-
-    @property
-    def files(self) -> list[Path]:
-        """The files."""
-        chosen = (self.events, self.figure, self.animation, self.path)
-        return [file for file in chosen if file]
-
-    @property
-    def need_log(self) -> bool:
-        """Whether an output is made from the event log."""
-        return bool(self.files) or self.plan is not None
-
-    @property
-    def fill_stdout(self) -> bool:
-        """Whether standard output has the event log."""
-        return self.events is not None and console.is_stdout(self.events)
-
-    def check_degrees(self, space: "ScenarioSpace") -> None:
-        """Refuse a path in degrees of a sea that has none."""
-        if self.path and self.path.suffix.lower() in (".kml", ".gpx") and space.centre is None:
-            raise InputError(f"--path: {self.path}", "the sea has no degrees", ".geojson, .csv")
-
-    def check_files(self, as_json: bool) -> None:
-        """Refuse files that exclude each other, have a wrong ending, or cannot be made here."""
-        if len({file.absolute() for file in self.files}) < len(self.files):
-            raise InputError("--events, --figure", "the same file", "a file for each")
-        console.check_ending("--events", self.events, LOGS, "an event log", is_stream=True)
-        console.check_ending("--figure", self.figure, FIGURES, "a picture")
-        console.check_ending("--animation", self.animation, ANIMATIONS, "an animation")
-        console.check_ending("--path", self.path, PATHS, "a path")
-        if self.animation and self.animation.suffix.lower() == ".mp4":
-            from dess.reports.player import check_ffmpeg
-
-            check_ffmpeg()
-        if self.fill_stdout and as_json:
-            raise InputError("--json", "standard output has the event log", "--events FILE")
-
-    def write(self, mission: "_MissionToWrite", temporaries: Sequence[Path]) -> None:
-        """Write the mission into temporary files, which become ``files``."""
-        from dess.base.files.writing import writable
-
-        writers = {
-            self.events: _write_log,
-            self.figure: _write_map,
-            self.animation: _write_animation,
-            self.path: _write_path,
-        }
-        for file, temporary in zip(self.files, temporaries, strict=True):
-            with writable(file):
-                writers[file](mission, temporary, file.suffix[1:].lower())
-
-
 def _read_scenario(
     scenario: str,
     settings: list[str] | None,
@@ -315,7 +247,7 @@ def _read_study(
 
 def _simulate(
     asked: _Asked, has_log: bool, separation: "Separation", start: datetime | None
-) -> "_MissionToWrite":
+) -> SimulatedMission:
     """Simulate the mission."""
     from dess.model.mission import simulate
     from dess.model.processes import load_processes
@@ -335,7 +267,7 @@ def _simulate(
             starts=asked.starts,
         )
     drawn = sample_scenario(asked.space, *which)
-    return _MissionToWrite(record, drawn, asked.title, separation, start)
+    return SimulatedMission(record, drawn, asked.title, separation, start)
 
 
 def _choose_of_study(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:
@@ -361,87 +293,7 @@ def _refuse_given(context: typer.Context, names: Sequence[str], problem: str, al
             raise InputError(f"--{option}", problem, allowed.format(option))
 
 
-@dataclass(frozen=True)
-class _MissionToWrite:
-    """A simulated mission to write into files: its record with its event log, and its names."""
-
-    record: "MissionRecord"
-    scenario: "Scenario"
-    title: str
-    separation: "Separation"
-    start: datetime | None = None
-
-    @property
-    def log(self) -> "dict[str, np.ndarray]":
-        assert self.record.events is not None
-        return self.record.events.columns()
-
-    @property
-    def outcome(self) -> str:
-        from dess.analysis.metrics import format_length
-        from dess.analysis.numbers import format_percent
-        from dess.analysis.results.event_log import causes_of_failure
-
-        ends = [uav["end"] for uav in self.record.uav_rows()]
-        ended = sum(end in ("quota", "landed") for end in ends)
-        outcome = (
-            f"{format_percent(self.record.collection_ratio)} of the data collected in "
-            f"{format_length(self.record.slots, self.scenario.units)}; {ended} of {len(ends)} UAVs "
-            f"{self.scenario.aim}."
-        )
-        return " ".join([outcome, *(f"{c}." for c in causes_of_failure(self.log, self.scenario))])
-
-
-def _write_log(mission: _MissionToWrite, path: Path, kind: str) -> None:
-    import numpy as np
-    import pandas as pd
-    import pyarrow as pa
-
-    from dess.analysis.numbers import write_csv
-    from dess.base.files.tables import parquet_of
-    from dess.base.files.writing import fill
-
-    columns = dict(mission.log)
-    if names := mission.scenario.names:
-        columns["name"] = np.array([*names, None])[columns["node"]]
-    if kind == "csv":
-        fill(path, write_csv(pd.DataFrame(columns)).encode())
-    else:
-        fill(path, parquet_of(pa.table(columns)))
-
-
-def _write_map(mission: _MissionToWrite, path: Path, kind: str) -> None:
-    from dess.analysis.figures.missions import mission_figure
-
-    save_figure(mission_figure(mission.log, mission.scenario), path, kind)
-
-
-def save_figure(figure: "Figure", path: Path, kind: str) -> None:
-    """Write a figure into a temporary file; ``kind`` is the ending of its final name."""
-    figure.savefig(path, format=kind)
-
-
-def _write_animation(mission: _MissionToWrite, path: Path, kind: str) -> None:
-    from dess.reports.player import write_animation
-
-    if kind == "html":
-        _write_page(mission, path)
-    else:
-        write_animation(mission.log, mission.scenario, path, kind, mission.title)
-
-
-def _write_path(mission: _MissionToWrite, path: Path, kind: str) -> None:
-    from dess.analysis.results.event_log import path_text
-    from dess.base.files.writing import fill
-
-    altitudes = None
-    if mission.scenario.units and mission.scenario.landing:
-        altitudes = mission.separation.altitudes(mission.scenario)
-    text = path_text(mission.log, mission.scenario, kind, mission.start, altitudes)
-    fill(path, text.encode())
-
-
-def _parse_start(text: str | None, outputs: _Outputs) -> datetime | None:
+def _parse_start(text: str | None, outputs: Outputs) -> datetime | None:
     """A time of day with its date, in UTC unless it says otherwise; None if there is no text.
 
     Raises:
@@ -492,7 +344,7 @@ def _open_folder(plan: Path | None) -> AbstractContextManager[Path | None]:
 
 
 def _parse_separation(
-    context: typer.Context, air: str, ground: str, outputs: _Outputs
+    context: typer.Context, air: str, ground: str, outputs: Outputs
 ) -> "Separation":
     """How far apart UAVs have to be.
 
@@ -516,35 +368,8 @@ def _parse_separation(
     return Separation(*metres)
 
 
-def _write_plan(mission: _MissionToWrite, positions: "Positions", folder: Path) -> "FlightPlan":
-    from dess.analysis.flights.flight_plan import FlightPlan
-    from dess.base.files.writing import fill
-
-    flight_plan = FlightPlan.of(
-        mission.log, mission.scenario, positions, mission.start, mission.separation
-    )
-    for name, text in flight_plan.make_files().items():
-        fill(folder / name, text)
-    return flight_plan
-
-
-def _write_page(mission: _MissionToWrite, path: Path) -> None:
-    """Write a page with the player of the mission; the same mission gives the same bytes."""
-    from dess.base.files import writing
-    from dess.reports import player
-    from dess.reports.pages.templates import fill_page
-
-    caption = player.explain_player(mission.scenario)
-    shown = player.Shown(mission.log, mission.scenario)
-    played = player.make_player([shown], "mission", caption)
-    parts = {"library": player.player_script().data, "player": played.data}
-    title, outcome = mission.title, mission.outcome
-    page = fill_page("mission.html", scripts=True, title=title, outcome=outcome, **parts)
-    writing.fill(path, page)
-
-
 def _make_document(
-    asked: _Asked, mission: _MissionToWrite, flight_plan: "FlightPlan | None"
+    asked: _Asked, mission: SimulatedMission, flight_plan: "FlightPlan | None"
 ) -> dict[str, Any]:
     """The mission as plain data."""
     record = mission.record
@@ -559,7 +384,7 @@ def _make_document(
     return document
 
 
-def _print_plan(flight_plan: "FlightPlan", outputs: _Outputs) -> None:
+def _print_plan(flight_plan: "FlightPlan", outputs: Outputs) -> None:
     """Print what there is to say of a plan, on stderr if standard output has the event log."""
     stream = sys.stdout
     if outputs.fill_stdout:
@@ -568,7 +393,7 @@ def _print_plan(flight_plan: "FlightPlan", outputs: _Outputs) -> None:
         console.print_text(line, stream)
 
 
-def _metric_values(mission: _MissionToWrite) -> dict[str, float]:
+def _metric_values(mission: SimulatedMission) -> dict[str, float]:
     """The metrics of every mission."""
     metrics = mission.record.metrics
     return _values_in_units(
@@ -576,7 +401,7 @@ def _metric_values(mission: _MissionToWrite) -> dict[str, float]:
     )
 
 
-def _values_in_units(values: dict[str, Any], mission: _MissionToWrite) -> dict[str, Any]:
+def _values_in_units(values: dict[str, Any], mission: SimulatedMission) -> dict[str, Any]:
     """Values of the mission; with a data sheet, in units as well."""
     from dess.analysis.metrics import columns_in_units
 
@@ -584,8 +409,9 @@ def _values_in_units(values: dict[str, Any], mission: _MissionToWrite) -> dict[s
     return values | columns_in_units(values, units) if units else values
 
 
-def _print_mission(mission: _MissionToWrite) -> None:
-    from dess.analysis.metrics import column_in_sheet_unit, measured_in, metric_of
+def _print_mission(mission: SimulatedMission) -> None:
+    from dess.analysis.measured import measured_in
+    from dess.analysis.metrics import column_in_sheet_unit, metric_of
     from dess.analysis.results.event_log import causes_of_failure, residual_data
 
     metrics = _metric_values(mission)

@@ -230,7 +230,8 @@ def _show_comparison(
     """Show how every design point differs from one of them, with the same policy."""
     from dess.analysis import numbers
     from dess.analysis.answers.settings import baseline
-    from dess.analysis.metrics import METRICS, measured_in, usual_metric
+    from dess.analysis.measured import measured_in, usual_metric
+    from dess.analysis.metrics import METRICS
     from dess.reports.cli import tables as printed
 
     metrics = [*METRICS, *measured_in(results.missions)]

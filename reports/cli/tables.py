@@ -17,17 +17,8 @@ from dess.analysis.answers.settings.ranking import ranking_metric
 from dess.analysis.answers.settings.sobol import index_table
 from dess.analysis.ask.answer import settings_answer
 from dess.analysis.facts import Fact
-from dess.analysis.metrics import (
-    METRICS,
-    PRODUCT,
-    RATIO,
-    SUCCESS,
-    Metric,
-    measured_in,
-    metric_group,
-    metric_of,
-    usual_metric,
-)
+from dess.analysis.measured import measured_in, usual_metric
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS, Metric, metric_group, metric_of
 from dess.analysis.names import field_named
 from dess.analysis.paper import values
 from dess.analysis.results.tables import Results

@@ -33,7 +33,7 @@ from IPython.display import display
 from dess.analysis import metrics, tables, what_if
 from dess.analysis.answers import summary
 from dess.analysis.answers.policies import comparisons
-from dess.analysis.answers.variation import measured_columns
+from dess.analysis.answers.sides import measured_columns
 from dess.analysis.metrics import metric_of
 from dess.reports.pages import study as page
 from dess.reports.pages.markdown import code_block, command_block, escape_sentences, write_markdown

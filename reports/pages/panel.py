@@ -19,12 +19,7 @@ from markupsafe import Markup
 from dess import InputError
 from dess.analysis.execution.effort import seconds_of
 from dess.analysis.figures import style
-from dess.analysis.metrics import (
-    NODES_BEHIND,
-    PRODUCT,
-    choose_units,
-    metric_of,
-)
+from dess.analysis.metrics import NODES_BEHIND, PRODUCT, choose_units, metric_of
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS

@@ -4,13 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from dess.analysis.metrics import (
-    AGE,
-    PRODUCT,
-    RATIO,
-    SUCCESS,
-    metric_of,
-)
+from dess.analysis.metrics import AGE, PRODUCT, RATIO, SUCCESS, metric_of
 from dess.analysis.study.cheapest import Cheapest, horizon_of
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS, PRICES

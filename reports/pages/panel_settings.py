@@ -6,9 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from dess import InputError
-from dess.analysis.metrics import (
-    size_of,
-)
+from dess.analysis.metrics import size_of
 from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
 from dess.base.files.writing import toml_value

@@ -15,7 +15,8 @@ import pyarrow.parquet as pq
 from dess.analysis.results import parquet
 from dess.analysis.results.chunks import FOLDERS, Chunk
 from dess.analysis.results.manifest import CellPart, Manifest
-from dess.analysis.results.store import Store, rows_of, stack_tables
+from dess.analysis.results.rows import rows_of, stack_tables
+from dess.analysis.results.store import Store
 
 LONGEST = 120  # bytes of a file's name that are made of the text
 

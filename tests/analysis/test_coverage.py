@@ -15,17 +15,8 @@ import pytest
 from scipy import stats
 
 from dess import load_scenario, simulate_batch
-from dess.analysis.metrics import (
-    AGE,
-    LEAST_COST,
-    MOST_COST,
-    MOST_SLOTS,
-    PRODUCT,
-    REWARD,
-    metric_in_missions,
-    metric_in_space,
-    metric_of,
-)
+from dess.analysis.metric_ranges import metric_in_missions, metric_in_space
+from dess.analysis.metrics import AGE, LEAST_COST, MOST_COST, MOST_SLOTS, PRODUCT, REWARD, metric_of
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.distribution import quantile_interval
 from dess.analysis.stats.intervals import (

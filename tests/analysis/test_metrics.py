@@ -3,7 +3,7 @@
 import pytest
 
 from dess import ScenarioSpace
-from dess.analysis.metrics import longest_wait, metric_in_missions, metric_in_space
+from dess.analysis.metric_ranges import longest_wait, metric_in_missions, metric_in_space
 from tests.analysis.small import SHEET, grid
 
 MEASURED = {"charging.measured": True, "failures.uav_rate": 0.01, "age.measured": True}

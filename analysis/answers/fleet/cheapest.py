@@ -46,15 +46,7 @@ from dess.analysis.answers.settings.points import (
 from dess.analysis.answers.settings.ranking import unequal_lengths
 from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
-from dess.analysis.metrics import (
-    AGE,
-    COST,
-    HOME,
-    SUCCESS,
-    Metric,
-    column_in_sheet_unit,
-    metric_of,
-)
+from dess.analysis.metrics import AGE, COST, HOME, SUCCESS, Metric, column_in_sheet_unit, metric_of
 from dess.analysis.names import DECISIONS
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.requirement import Requirement

@@ -65,6 +65,7 @@ def priced_settings(results: Results) -> pd.DataFrame:
     """
     words = fleets_in_words(results)
     table = rank_settings(results, COST).drop(columns=["rank", "standing", "tied"])
+    table = table.drop(columns="fleet", errors="ignore")  # types of UAVs, which words name
     of_points = conditions_in_words(results)
     table.insert(0, "condition", [of_points[point] for point in table["point"]])
     table.insert(1, "fleet", [words[point] for point in table["point"]])

@@ -3,11 +3,7 @@
 import pandas as pd
 
 from dess.analysis.answers.policies.ranks import best_policy, rank_learned_and_others
-from dess.analysis.metrics import (
-    METRICS,
-    PRODUCT,
-    metric_of,
-)
+from dess.analysis.metrics import METRICS, PRODUCT, metric_of
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import (
@@ -19,10 +15,10 @@ from dess.analysis.stats.learners import compare_learners
 from dess.analysis.tables import (
     INTERVALS,
     MARKED,
-    WIDER,
     Table,
     allowance_sentence,
     comparison_cells,
+    most_widened,
 )
 
 
@@ -131,11 +127,9 @@ def allowance_for_difference(rows: pd.DataFrame, of: str, metric: str = PRODUCT)
         Sentences with the example that becomes wider by most; empty if none becomes much wider.
     """
     rows = rows[(rows["metric"] == metric) & rows["student"].notna()]
-    halves = (rows["high"] - rows["low"]) / 2
-    widest = rows.assign(half=halves)[halves > WIDER * rows["student"]]
-    if widest.empty:
+    row = most_widened(rows)
+    if row is None:
         return ""
-    row = widest.loc[(widest["half"] / widest["student"].clip(lower=1e-12)).idxmax()]
     unit = metric_of(metric)
     if unit.in_percent:
         scale, words = (100, " points")

@@ -8,13 +8,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.analysis.answers.summary import means_of_points
 from dess.analysis.figures import Drawing, name_best_mean
-from dess.analysis.metrics import (
-    HOME,
-    METRICS,
-    PRODUCT,
-    SUCCESS,
-    metric_of,
-)
+from dess.analysis.metrics import HOME, METRICS, PRODUCT, SUCCESS, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import (
     difference_of_intervals,

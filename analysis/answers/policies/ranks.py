@@ -4,7 +4,8 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from dess.analysis.metrics import metric_of, usual_metric
+from dess.analysis.measured import usual_metric
+from dess.analysis.metrics import metric_of
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.weights import values_within

@@ -13,12 +13,9 @@ from dess.analysis.answers.settings.points import (
     points_in_words,
     values_of_points,
 )
-from dess.analysis.metrics import (
-    METRICS,
-    check_metric,
-    metric_in_groups,
-    metric_of,
-)
+from dess.analysis.measured import check_metric
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import METRICS, metric_of
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import add_adjusted, column_tests
 from dess.analysis.stats.kinds import level_after

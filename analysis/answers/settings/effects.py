@@ -16,14 +16,9 @@ from dess.analysis.answers.settings.points import (
     points_left,
     values_of_points,
 )
-from dess.analysis.metrics import (
-    PRODUCT,
-    Metric,
-    check_metric,
-    metric_in_groups,
-    metric_of,
-    metrics_in,
-)
+from dess.analysis.measured import check_metric, metrics_in
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import PRODUCT, Metric, metric_of
 from dess.analysis.names import field_named, value_text
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead

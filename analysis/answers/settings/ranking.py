@@ -29,20 +29,9 @@ from dess.analysis.answers.settings.points import (
 )
 from dess.analysis.answers.settings.years import age_sentence, year_facts
 from dess.analysis.facts import Fact, known_facts
-from dess.analysis.metrics import (
-    COST,
-    HOME,
-    PRODUCT,
-    SUCCESS,
-    Metric,
-    check_ranking_metric,
-    format_length,
-    metric_in_groups,
-    metric_of,
-    metrics_in,
-    ranking_column,
-    usual_metric,
-)
+from dess.analysis.measured import check_ranking_metric, metrics_in, ranking_column, usual_metric
+from dess.analysis.metric_ranges import metric_in_groups
+from dess.analysis.metrics import COST, HOME, PRODUCT, SUCCESS, Metric, format_length, metric_of
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.stats.alternatives import judge_alternatives, may_lead
 from dess.analysis.stats.intervals import column_intervals, mean_interval

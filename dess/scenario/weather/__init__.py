@@ -87,6 +87,12 @@ class Weather(Section):
         ALWAYS, description=Description("hours in which UAVs may fly", form=_OPERATING)
     )
     height: str = Field("10 m", description="height of the anemometer above the water")
+    calm: bool = Field(
+        False,
+        description=Description(
+            "whether UAVs fly as in still air", note="to see what the wind decides"
+        ),
+    )
     longitude: Number | None = Field(
         None,
         ge=-180,

@@ -25,12 +25,14 @@ from dess.scenario.places import Projection
 from dess.scenario.quantities import measured
 from dess.scenario.rotary_wing import RotaryWing, airspeeds_of
 from dess.scenario.weather import ALWAYS, DAYLIGHT, Weather
+from dess.scenario.weather.formats import known_name
 from dess.scenario.weather.series import HOUR, Series
 from dess.scenario.weather.sun import is_light
 
 DAY = 24 * HOUR
 SHEAR = 0.11  # the exponent of the wind's growth with height, over open water
 _LN10 = 2.302585092994046
+_WINDS = ("wind", "gust")  # columns whose limits do not count in still air
 _ROUNDING = 1e-9  # what rounding may add to the square of an airspeed, as a share
 
 
@@ -173,10 +175,12 @@ def _hours_of(flight: _Flight, version: tuple[int, int]) -> Hours:
         if values is None:
             problem = f"has no {limit.column}, of the limits"
             raise InputError(weather.path, problem, listed(series.columns))
+        if weather.calm and known_name(limit.column) in _WINDS:
+            continue
         beyond = values < limit.value if limit.is_least else values > limit.value
         state[beyond] = State.LIMIT + number
         is_missing |= np.isnan(values)
-    wind = np.where(is_missing, 0.0, series.wind)
+    wind = np.where(is_missing | weather.calm, 0.0, series.wind)
     wind = wind * wind_factor(flight.altitude, _height_of(weather))
     state[~_can_fly(flight, wind, series.origin)] = State.WIND
     state[is_missing] = State.MISSING

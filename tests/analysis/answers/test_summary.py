@@ -12,14 +12,8 @@ from dess.analysis import load_study, run_study
 from dess.analysis.answers import summary
 from dess.analysis.answers.policies import comparisons, performance, ranks
 from dess.analysis.answers.settings.sobol import sobol_indices
-from dess.analysis.metrics import (
-    METRICS,
-    PRODUCT,
-    RATIO,
-    check_metric,
-    check_ranking_metric,
-    recorded_metrics,
-)
+from dess.analysis.measured import check_metric, check_ranking_metric, recorded_metrics
+from dess.analysis.metrics import METRICS, PRODUCT, RATIO
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.stats.alternatives import BEST, ONLY, SEEN_BEST, TIED
 from dess.analysis.stats.differences import compare

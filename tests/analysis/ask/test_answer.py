@@ -10,9 +10,10 @@ from scipy import stats
 
 from dess import InputError
 from dess.analysis import numbers, sweep, what_if
-from dess.analysis.answers import variation as found
+from dess.analysis.answers import sides as paired
 from dess.analysis.answers.settings.points import varied_values
-from dess.analysis.answers.variation import BASELINE, VARIATION
+from dess.analysis.answers.sides import BASELINE, VARIATION
+from dess.analysis.answers.variation import Variation, format_change
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.differences import adjust_p_values, compare_pairs
 from dess.analysis.stats.kinds import LEVEL
@@ -98,7 +99,7 @@ def row(difference, low, high, p=0.01, n=100, p_student=1.0):
 def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
     changes = {"age.reward": -1.0, "failures.uav_rate": 0.2, "failures.uav_repair": 3.0}
     results = asked(tmp_path, 6, settings=changes, policies=["greedy"]).results
-    answers = found.compare_sides(results).set_index("metric")
+    answers = paired.compare_sides(results).set_index("metric")
     sides = results.missions.pivot(index="replication", columns="point", values="age")
     change = (sides[VARIATION] - sides[BASELINE]).mean()
     assert answers.loc["age", "difference"] == pytest.approx(change)
@@ -110,7 +111,7 @@ def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(t
 
 
 def test_what_is_called_adjusted_is_adjusted(answer):
-    for _, rows in found.compare_sides(answer.results).groupby("policy"):
+    for _, rows in paired.compare_sides(answer.results).groupby("policy"):
         known = rows[rows["p"].notna()]
         expected = adjust_p_values(known["p"].to_numpy(), "holm")
         assert known["p_adjusted"].tolist() == expected.tolist()
@@ -125,7 +126,7 @@ def test_nobody_waits_where_there_is_a_pad_for_every_uav(tmp_path):
 
 def test_a_mean_per_uav_is_that_over_the_uavs_of_the_mission(answer):
     mission = ["policy", "point", "replication"]
-    missions = found.missions_of(answer.results).set_index(mission)
+    missions = paired.missions_of(answer.results).set_index(mission)
     of_uavs = answer.results.uavs.groupby(mission)[["slots_charging", "slots_waiting"]].mean()
     for column, name in zip(of_uavs, ("charging_per_uav", "waiting_per_uav"), strict=True):
         assert missions[name].any()
@@ -188,13 +189,13 @@ def test_so_many_missions_show_the_difference_that_was_seen():
     """So many normal differences of that mean and spread are significant with that power."""
     n, gap, spread = 400, 0.05, 0.8
     half = stats.t.isf((1 - LEVEL) / 2, n - 1) * spread / np.sqrt(n)
-    needed = found.missions_needed(row(gap, gap - half, gap + half, n=n))
+    needed = paired.missions_needed(row(gap, gap - half, gap + half, n=n))
     edge = stats.t.isf((1 - LEVEL) / 2, needed - 1)
     power = stats.nct.sf(edge, needed - 1, gap / spread * np.sqrt(needed))
-    assert power == pytest.approx(found.POWER, abs=0.02)
-    assert found.missions_needed(row(-gap, -gap - half, -gap + half, n=n)) == needed
+    assert power == pytest.approx(paired.POWER, abs=0.02)
+    assert paired.missions_needed(row(-gap, -gap - half, -gap + half, n=n)) == needed
     for nothing in (row(0.0, -half, half), row(0.0, 0.0, 0.0), row(gap, gap, gap)):
-        assert found.missions_needed(nothing) == np.inf
+        assert paired.missions_needed(nothing) == np.inf
 
 
 def test_what_is_allowed_for_rare_failures_falls_with_the_number_of_missions():
@@ -203,7 +204,7 @@ def test_what_is_allowed_for_rare_failures_falls_with_the_number_of_missions():
         values = baseline + 0.014 + 0.01 * np.resize([-1, 1], n)
         return pd.Series(compare_pairs(values, baseline, metric=PRODUCT)._asdict())
 
-    needed = int(found.missions_needed(pairs(40)))
+    needed = int(paired.missions_needed(pairs(40)))
     assert pairs(40).low < 0 < pairs(needed).low
     assert pairs(needed // 2).low < 0
 
@@ -228,12 +229,12 @@ def test_a_gain_in_most_missions_is_better_in_what_was_seen(answer):
     uavs = [one.assign(point=row["point"], replication=row["replication"]) for row in rows]
     made = replace(answer.results, missions=pd.DataFrame(rows), uavs=pd.concat(uavs))
     assert (gains > 0).sum() == 234
-    table = found.compare_sides(made).set_index("metric")
+    table = paired.compare_sides(made).set_index("metric")
     verdicts = {m: judge_difference(table.loc[m]) for m in (PRODUCT, "collection_ratio")}
     verdicts |= {m: judge_difference(table.loc[m]) for m in ("collected", "collected_per_uav")}
     assert {*verdicts.values()} == {SEEN_ABOVE}
     assert judge_difference(table.loc["residual"]) == SEEN_BELOW
-    variation = found.Variation(made, like["policy"])
+    variation = Variation(made, like["policy"])
     policy = like["policy"]
     said = found_of(variation.facts())
     assert said[f"product with {policy}"].startswith("+0")
@@ -258,7 +259,7 @@ def with_missions(answer, before, after, ratios):
 def test_the_typical_mission_has_the_median_difference_and_the_worst_the_least_left(answer):
     before, after = [0.5, 0.5, 0.9, 0.1, 0.9], [0.6, 0.4, 0.0, 0.3, 0.0]
     made = with_missions(answer, before, after, [0.6, 0.4, 0.8, 0.3, 0.7])
-    differences = found.paired_differences(made.results, "greedy").tolist()
+    differences = paired.paired_differences(made.results, "greedy").tolist()
     assert differences == pytest.approx([0.1, -0.1, -0.9, 0.2, -0.9])
     assert (made.variation.typical().replication, made.variation.worst().replication) == (1, 4)
     even = with_missions(answer, [0.0] * 4, [0.4, 0.1, 0.2, 0.2], [0.5] * 4)
@@ -280,17 +281,17 @@ def test_what_contradicts_the_mean_is_told_by_pairs_and_failures(answer):
 
 def test_a_metric_that_is_equal_in_all_missions_has_no_correlation(answer, monkeypatch):
     table = answer.table().assign(variance_reduction=np.nan, correlation=np.nan)
-    monkeypatch.setattr(found, "compare_sides", lambda _: table)
+    monkeypatch.setattr("dess.analysis.answers.variation.compare_sides", lambda _: table)
     assert set(answer.variation.pairing()["Correlation"]) == {"no variance"}
     assert "nan" not in answer.variation.pairing().to_string()
 
 
 def test_the_best_policy_of_each_side_is_found(answer):
-    table = found.means_of_sides(answer.results)
+    table = paired.means_of_sides(answer.results)
     for point in (BASELINE, VARIATION):
         side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
         best = side.loc[side["mean"].idxmax(), "policy"]
-        assert found.best_policy_of_side(answer.results, point) == best
+        assert paired.best_policy_of_side(answer.results, point) == best
     assert answer.variation.shown == best
     assert answer.headline() in answer._repr_markdown_()  # what Jupyter shows
     assert {f"product with {policy}" for policy in POLICIES} <= {*found_of(answer.facts())}
@@ -331,10 +332,10 @@ def test_captions_say_what_the_figures_show(answer):
         for row in rows.itertuples():
             if row.low < row.high:
                 assert f"with {row.policy} " in sentence
-                assert f"({found.format_change(row)}" in sentence
+                assert f"({format_change(row)}" in sentence
     for policy in answer.results.policies:
         share = numbers.format_percent(
-            (found.paired_differences(answer.results, policy) > 0).mean()
+            (paired.paired_differences(answer.results, policy) > 0).mean()
         )
         assert f"higher in {share} and lower in" in variation.spread_in_words()
     never = answer.table().query("low == high == 0").iloc[0]

@@ -12,7 +12,9 @@ from dess import simulate_batch
 from dess.analysis import run_study, summary
 from dess.analysis.execution.evaluation import evaluate as evaluate_alone
 from dess.analysis.execution.evaluation import of_results
-from dess.analysis.metrics import LEAST, NODE_AGES, NODE_RATIOS, measured_in, metric_in_missions
+from dess.analysis.measured import measured_in
+from dess.analysis.metric_ranges import metric_in_missions
+from dess.analysis.metrics import LEAST, NODE_AGES, NODE_RATIOS
 from dess.analysis.results.resimulate import difference_in_words, resimulate, stored_record
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import interval_of

@@ -12,7 +12,8 @@ from dess.analysis.execution import runner
 from dess.analysis.results import parquet, provenance
 from dess.analysis.results.chunks import Chunk, split_into_chunks
 from dess.analysis.results.manifest import Cell, CellPart
-from dess.analysis.results.store import Failure, Store, gaps_between
+from dess.analysis.results.replications import gaps_between
+from dess.analysis.results.store import Failure, Store
 from dess.policies import load
 from tests.analysis.small import files_of, small_study, write_scenario
 from tests.reports.small import quick

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dess.analysis.metrics import MOST_SLOTS, SUCCESS, metric_in_missions, metric_of
+from dess.analysis.metric_ranges import metric_in_missions
+from dess.analysis.metrics import MOST_SLOTS, SUCCESS, metric_of
 from dess.analysis.stats.alternatives import may_be_best
 from dess.analysis.stats.differences import difference_test
 

@@ -7,6 +7,7 @@ from pandas.testing import assert_frame_equal
 from scipy import stats
 
 from dess import InputError
+from dess.analysis.metric_ranges import metric_in_missions
 from dess.analysis.metrics import (
     LEAST_COST,
     MOST_COST,
@@ -15,7 +16,6 @@ from dess.analysis.metrics import (
     PRODUCT,
     REWARD,
     SUCCESS,
-    metric_in_missions,
 )
 from dess.analysis.stats.differences import (
     Paired,

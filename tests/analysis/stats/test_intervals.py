@@ -8,17 +8,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from dess import load_scenario
-from dess.analysis.metrics import (
-    MOST_SLOTS,
-    OLDEST,
-    PRODUCT,
-    RATIO,
-    REWARD,
-    SUCCESS,
-    metric_for_length,
-    metric_in_missions,
-    metric_in_space,
-)
+from dess.analysis.metric_ranges import metric_for_length, metric_in_missions, metric_in_space
+from dess.analysis.metrics import MOST_SLOTS, OLDEST, PRODUCT, RATIO, REWARD, SUCCESS
 from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (
     Moments,

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from dess.analysis.metrics import LEAST, PRODUCT, REWARD, SUCCESS, metric_for_length, metric_of
+from dess.analysis.metric_ranges import metric_for_length
+from dess.analysis.metrics import LEAST, PRODUCT, REWARD, SUCCESS, metric_of
 from dess.analysis.stats import kinds
 from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (

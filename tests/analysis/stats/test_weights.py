@@ -5,12 +5,7 @@ import pandas as pd
 import pytest
 
 from dess.analysis.execution.evaluation import Asked, estimate_means, evaluate
-from dess.analysis.metrics import (
-    PRODUCT,
-    RATIO,
-    REWARD,
-    SUCCESS,
-)
+from dess.analysis.metrics import PRODUCT, RATIO, REWARD, SUCCESS
 from dess.analysis.stats.differences import compare
 from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import (

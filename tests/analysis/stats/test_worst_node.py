@@ -6,15 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dess.analysis.metrics import (
-    LEAST,
-    NODE_AGES,
-    NODE_RATIOS,
-    OLDEST,
-    metric_for_length,
-    metric_in_missions,
-    metric_of,
-)
+from dess.analysis.metric_ranges import metric_for_length, metric_in_missions
+from dess.analysis.metrics import LEAST, NODE_AGES, NODE_RATIOS, OLDEST, metric_of
 from dess.analysis.stats.intervals import (
     Moments,
     bounded_interval,

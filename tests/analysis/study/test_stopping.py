@@ -6,7 +6,8 @@ from pydantic import ValidationError
 
 from dess.analysis import run_study
 from dess.analysis.answers.decided import reached_precisions
-from dess.analysis.metrics import LEAST, METRICS, OLDEST, metric_for_length, metric_group, metric_of
+from dess.analysis.metric_ranges import metric_for_length
+from dess.analysis.metrics import LEAST, METRICS, OLDEST, metric_group, metric_of
 from dess.analysis.stats.groups import summary
 from dess.analysis.stats.intervals import interval_of, share_interval
 from dess.analysis.stats.worst_node import worst_of_nodes

@@ -6,18 +6,14 @@ import pytest
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
 from dess.model.view import View
 from dess.policies.planner.fluid import (
-    CHARGE,
     MOST_SLOTS,
-    NEVER,
-    Plan,
     begin_flight,
     empty_flight,
-    empty_plan,
-    insert_waypoint,
     simulate_flight,
 )
 from dess.policies.planner.rates import RATES_PART, Rates, load_rates
 from dess.policies.planner.search import BEST, TRIED, empty_workspace, improve_plan
+from dess.policies.planner.waypoints import CHARGE, NEVER, Plan, empty_plan, insert_waypoint
 from tests.dess.model.flights import first_view
 
 DEPLETED = 100.0  # the penalty for an empty battery [data units]

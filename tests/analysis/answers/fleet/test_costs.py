@@ -10,7 +10,7 @@ from dess.analysis.answers.fleet.costs import (
     price_facts,
     priced_settings,
 )
-from dess.analysis.metrics import metric_in_missions
+from dess.analysis.metric_ranges import metric_in_missions
 from dess.analysis.stats.front import on_front
 from dess.analysis.stats.intervals import interval_of
 from dess.analysis.study.prices import Costs, most_battery_per_slot
@@ -71,6 +71,20 @@ def test_the_interval_of_a_mean_cost_is_that_of_its_own_fleet(fixed):
         missions = missions[missions["point"] == row.point]
         expected = interval_of(metric_in_missions(missions, "cost"), missions["cost"].to_numpy())
         assert (row.cost, row.cost_low, row.cost_high) == pytest.approx(tuple(expected))
+
+
+def test_types_of_uavs_are_settings_with_prices_of_their_own(studied):
+    """Which drone: one with a price of its own, or one at the price of the study."""
+    types = [[{"price": 1100}], [{"slots_per_cell": 2}]]
+    design = {"kind": "grid", "values": {"fleet": types, "uavs": [1, 2]}}
+    table = priced_settings(studied(missions=4, design=design, costs={"uav": 1000}))
+    costs = table.set_index("fleet")["cost"].round().to_dict()
+    assert costs == {
+        "1 UAV and fleet price 1100": 1100,
+        "2 UAVs and fleet price 1100": 2200,
+        "1 UAV and fleet slots_per_cell 2": 1000,
+        "2 UAVs and fleet slots_per_cell 2": 2000,
+    }
 
 
 def test_bad_questions_get_one_line(fixed, studied):

@@ -129,7 +129,7 @@ def test_what_decides_is_the_age_with_each_taken_away(asked):
     differences = table["mean"] - table["mean"][0]
     assert table["difference"].to_numpy() == pytest.approx(differences.to_numpy())
     told = found_of(asked.facts())["what decides the age"]
-    assert re.match(r"80 h; with flights round the clock \d+ h", told)
+    assert re.match(r"80 h; with still air \d+ h, with flights round the clock \d+ h", told)
     shown = around.table_around(asked.results)
     assert {*shown.cells["What if"]} == {*ages.index}
     # At 19 m/s over ground, a wind of 5 m/s leaves no hour in which all moves can be flown.

@@ -66,6 +66,17 @@ def test_an_hour_is_closed_by_the_first_reason(write):
     assert hours.names == {1: "night", 2: "missing", 3: "wind", 4: "limits.waves", 5: "limits.wind"}
 
 
+def test_in_still_air_known_hours_cost_and_close_as_without_wind(write):
+    rows = [(20, 45, 1.0), ("", 0, 1.0), (8, 180, 1.6), (8, 180, 1.0)]
+    limits = {"waves": "1.5 m", "wind": "4 m/s"}
+    about: dict[str, Any] = {"limits": limits, "calm": True}
+    hours = hours_of(space_of(write(rows), **about))
+    state, costs = hours.state.tolist(), hours.costs
+    assert state == [State.OPEN, State.MISSING, State.LIMIT, State.OPEN]
+    still = hours_of(space_of(write([(0, *row[1:]) for row in rows]), limits=limits))
+    assert (costs[[0, 3]] == still.costs[3]).all() and still.state[3] == State.OPEN
+
+
 def test_a_limit_may_be_the_least_value(write):
     path = write([(5, 0, 1.0), (5, 0, 2.0), (5, 0, 3.0)])
     assert states(path, limits={"waves": "> 2 m"}) == [State.LIMIT, 0, 0]
