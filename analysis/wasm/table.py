@@ -111,28 +111,33 @@ def pointer(typingctx: Any, address: Any) -> Any:
 
 @kernel
 def array1(table, at, dtype):
+    """The array with one axis that begins at a place of the table."""
     return carray(pointer(table[at]), (table[at + 1],), dtype)
 
 
 @kernel
 def array2(table, at, dtype):
+    """The array with two axes that begins at a place of the table."""
     return carray(pointer(table[at]), (table[at + 1], table[at + 2]), dtype)
 
 
 @kernel
 def array3(table, at, dtype):
+    """The array with three axes that begins at a place of the table."""
     shape = (table[at + 1], table[at + 2], table[at + 3])
     return carray(pointer(table[at]), shape, dtype)
 
 
 @kernel
 def array4(table, at, dtype):
+    """The array with four axes that begins at a place of the table."""
     shape = (table[at + 1], table[at + 2], table[at + 3], table[at + 4])
     return carray(pointer(table[at]), shape, dtype)
 
 
 @kernel
 def state_in(table):
+    """The ``State`` of one mission."""
     return State(
         array1(table, AT.missions, _MISSION),
         array2(table, AT.uavs, _UAV),
@@ -144,6 +149,7 @@ def state_in(table):
 
 @kernel
 def starts_in(table):
+    """The ``Starts`` of the scenario."""
     return Starts(
         array1(table, AT.constants, _MISSION),
         array3(table, AT.ranges, _I8),
@@ -157,6 +163,7 @@ def starts_in(table):
 
 @kernel
 def chart_in(table):
+    """The ``Chart`` of the sea."""
     return Chart(
         array2(table, AT.zones, _I1),
         array2(table, AT.parking, _I8),
@@ -169,6 +176,7 @@ def chart_in(table):
 
 @kernel
 def world_in(table):
+    """The ``World`` of the sea."""
     return World(
         array2(table, AT.nodes, _I8),
         array2(table, AT.mean_snr, _F8),
@@ -180,6 +188,7 @@ def world_in(table):
 
 @kernel
 def scratch_in(table):
+    """The ``Scratch`` of a slot."""
     return Scratch(
         array2(table, AT.batches, _BATCH),
         array2(table, AT.search, _I8),
@@ -189,6 +198,7 @@ def scratch_in(table):
 
 @kernel
 def records_in(table):
+    """The ``Records`` of the missions of a call."""
     return Records(
         array1(table, AT.mission_records, _MISSION_RECORD),
         array2(table, AT.uav_records, _UAV_RECORD),
@@ -207,6 +217,7 @@ def reach_in(table):
 
 @kernel
 def integers_in(table):
+    """The ``Integers`` of the network."""
     return Integers(
         array1(table, AT.weights, _I2),
         array1(table, AT.biases, _I4),
@@ -217,6 +228,7 @@ def integers_in(table):
 
 @kernel
 def sea_in(table):
+    """The ``Sea`` that the network sees."""
     mission = array1(table, AT.constants, _MISSION)[0]
     pads = np.empty(len(array1(table, AT.sizes, _I8)), np.int64)
     for zone in range(len(pads)):
@@ -232,6 +244,7 @@ def sea_in(table):
 
 @kernel
 def tables_in(table):
+    """The ``Tables`` of this sea."""
     return Tables(
         array2(table, AT.node_ways, _I2),
         array2(table, AT.zone_ways, _I2),
