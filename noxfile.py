@@ -21,7 +21,6 @@ STUDIES = {
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison failures": "--missions 400",
     "sweet-spot": "--policy ddqn --policy greedy",
-    "explorer": "--missions 30",
     "age": "",
     "planning": "",
     "gap": "--missions 20 --policy greedy --policy ddqn --policy planner",

@@ -37,13 +37,13 @@ TEMPLATES = HERE.parent / "reports" / "templates"
 SIZE = (1280, 800)
 PAGES = (
     *("index", "mission", "performance", "learning", "parameters"),
-    *("comparison", "what-if", "own-sea", "explorer"),
+    *("comparison", "what-if", "own-sea"),
 )
 PANEL, ASKED = "panel", "what-if"  # the picture of a panel, and its page
 # What the first screen of every page is made with.
 LOOK = (
     *("layout.html", "report.html", "bar.html", "index.html", "part.html", "picture.html"),
-    *("player.html", "player.js", "explorer.html", "explorer.js", "style.css"),
+    *("player.html", "player.js", "style.css"),
     *("panel.html", "panel.css", "panel_side.html", "panel_sliders.html", "panel_metrics.html"),
     *("panel_controls.js", "panel_view.js", "panel_runs.js", "panel.js", "try.html"),
 )

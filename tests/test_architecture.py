@@ -67,7 +67,7 @@ ROOMS = {
         *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),
     "reports": (
-        *("pages", "player", "explorer", "crate"),
+        *("pages", "player", "crate"),
         *("interrupts", "cli"),
     ),
 }

@@ -37,6 +37,7 @@ from dess.analysis.answers.settings.sobol import (
 from dess.analysis.paper import scorecard, values
 from dess.analysis.stats.kinds import LEVEL
 from dess.reports.pages.markdown import write_markdown
+from dess.reports.pages.panel import make_panel
 from dess.reports.pages.parts import lead_figure, make_answer, make_gallery
 from dess.reports.pages.provenance import provenance_table
 from dess.reports.pages.tables import make_table
@@ -117,6 +118,13 @@ make_gallery(
         if len(checks)
     ]
 )
+
+# %% [markdown]
+# ## Any other setting
+
+# %%
+space = fig5.scenario()
+make_panel(space, space, fig5.study.scenario, policies, fig5.store.manifest.seed)
 
 # %% [markdown]
 # ## The shares of the variance

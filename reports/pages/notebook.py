@@ -32,7 +32,7 @@ SHIPPED = Path(__file__).parents[1] / "notebooks"
 SCORECARD = "scorecard"
 # The reports in the order of the index, by what people ask.
 GROUPS = {
-    "Our sea, our fleet": ("own-sea", "sweep", "what-if", "pads", "failures", "age", "explorer"),
+    "Our sea, our fleet": ("own-sea", "sweep", "what-if", "pads", "failures", "age"),
     "The policies": ("seas", "planner", "comparison", "mission", "learning"),
     "The paper": ("performance", SCORECARD, "parameters"),
 }

@@ -23,6 +23,8 @@ _SCALED = {
     "max_slots": (0.5, 0.75, 1.0, 1.5, 2.0),
 }
 _LEVELS = {
+    "initial_data": (5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0),
+    "flying_time": (60, 70, 75, 80, 90, 100),
     "charge_start": (10, 20, 30, 40, 50),
     "charge_complete": (60, 70, 80, 90, 100),
     "failures.uav_rate": (0.0, 0.0005, 0.001, 0.002, 0.005),
@@ -34,6 +36,7 @@ OF_SHEET = {
     "data_sheet.wind": ("m/s from deg", (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)),
     _MTBF: ("s", (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0)),
 }
+_OF_PAPER = ("initial_data", "flying_time")  # a data sheet says it in its own words
 # How often UAVs fail, which is told as the mean time between failures.
 _FAILURES = ("failures.uav_rate", _MTBF)
 OFFERED = (*COUNTS, ZONE_PADS, *_SCALED, *OF_SHEET, *_LEVELS)
@@ -92,6 +95,8 @@ def _has_setting(space: ScenarioSpace, key: str) -> bool:
         return bool(space.zones)
     if key in OF_SHEET:
         return bool(space.units and space.value(key))
+    if key in _OF_PAPER:
+        return not space.units
     return True
 
 

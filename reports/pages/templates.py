@@ -31,7 +31,6 @@ _SCRIPTS = {
     SINGLE_SCRIPT: (*_COMMON, "panel_commands", "sha256", "replay", "another"),
     EXAMPLE_SCRIPT: (*_COMMON, "panel_series", "panel_crew", "try"),
     "worker": ("engine", "panel_worker"),
-    "explorer": ("panel_numbers", "panel_commands", "panel_controls", "explorer"),
 }
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
 # What all templates have in common: they escape values, and one that is undefined is an error.

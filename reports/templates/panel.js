@@ -167,8 +167,9 @@ function showGrid() {
     gridCommand = sweepCommand();
     find("fill-command").textContent = gridCommand;
     find("grid-bar").value = grid.count / (grid.count + grid.missing) || 0;
-    const state = isRunning ? `${grouped(grid.count)} missions, running.` : `${grid.openInWords()} ${grouped(grid.count)} missions.`;
-    find("grid-status").textContent = `${grid.inWords()} ${state}`;
+    const open = isRunning ? "" : grid.openInWords();
+    const sentences = [grid.inWords(), open, `${grouped(grid.count)} missions${isRunning ? ", running" : ""}.`];
+    find("grid-status").textContent = sentences.filter(Boolean).join(" ");
     grid.show();
 }
 

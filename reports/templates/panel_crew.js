@@ -54,7 +54,7 @@ class Crew {
         this.end();
         this.job = job;
         this.number += 1;
-        const most = Math.min(Math.max((navigator.hardwareConcurrency || 2) - 1, 1), MOST_WORKERS);
+        const most = Math.min(navigator.hardwareConcurrency || 2, MOST_WORKERS);
         try {
             while (this.members.length < most) this.members.push(this.hire());
             this.wake();

@@ -132,8 +132,12 @@ class Grid {
 
     // About how many more missions decide which cell is the cheapest, if all are like those so far.
     get missing() {
-        const leader = this.cheapest()?.cell;
-        return this.needed().reduce((sum, cell) => sum + (cell === leader ? 0 : this.missingOf(cell, leader)), 0);
+        const leader = this.cheapest()?.cell, needed = this.needed();
+        return this.cells.reduce((sum, cell) => {
+            const ofRound = cell.wanted - cell.track.count;
+            const isOpen = cell !== leader && needed.includes(cell);
+            return sum + Math.max(ofRound, isOpen ? this.missingOf(cell, leader) : 0);
+        }, 0);
     }
 
     /**
@@ -160,7 +164,8 @@ class Grid {
     // Which cell is the cheapest, in words.
     inWords() {
         const answer = this.cheapest();
-        if (answer === null) return `No cell ${this.needed().length ? "is known to meet" : "meets"} the requirements.`;
+        const isOpen = this.cells.some((cell) => this.verdict(cell) === "open");
+        if (answer === null) return `No cell ${isOpen ? "is known to meet" : "meets"} the requirements.`;
         const {cell, rivals} = answer, amount = written(this.cost, this.costOf(cell).mean);
         if (rivals.length) return `The cheapest so far is ${cell.name} for ${amount}.`;
         return `The cheapest is ${cell.name} for ${amount}: every cheaper cell misses the requirements.`;

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -51,17 +51,20 @@ def write_scenario(folder: Path, **changes: Any) -> Path:
 
 
 # Two years of weather for the small scenario: it is calm for four hours a day, in two of which UAVs
-# operate; never in January, and waves are high on the first ten days of July.
+# operate; not in January, and waves are high on the first ten days of July.
 STORM, CALM = 30, 5  # [m/s]
 HIGH, LOW = 3.0, 0.5  # [m]
 
 
-def write_years(folder: Path, **weather: Any) -> Path:
-    """The small scenario with a data sheet, one UAV, and two years of weather, as a TOML file."""
+def write_years(folder: Path, calm: Sequence[int] = range(1, 12), **weather: Any) -> Path:
+    """The small scenario with a data sheet, one UAV, and two years of weather, as a TOML file.
+
+    In a month that is not ``calm``, nobody flies; January has the number 0.
+    """
     hours = np.arange("2019-01-01T00", "2021-01-01T00", dtype="datetime64[h]")
     months = hours.astype("datetime64[M]")
     of_day = (hours - hours.astype("datetime64[D]")).astype(int)
-    is_calm = (months.astype(int) % 12 != 0) & (of_day >= 8) & (of_day < 12)
+    is_calm = np.isin(months.astype(int) % 12, calm) & (of_day >= 8) & (of_day < 12)
     days = (hours.astype("datetime64[D]") - months).astype(int)
     is_high = (months.astype(int) % 12 == 6) & (days < 10)
     rows = zip(hours, np.where(is_calm, CALM, STORM), np.where(is_high, HIGH, LOW), strict=True)

@@ -35,7 +35,6 @@ STUDIES: dict[str, dict[str, Any]] = {
     "comparison": {"policies": POLICIES, "missions": 40},
     "fig4": {"policies": POLICIES, "missions": 8, "logged": 2},
     "fig5": {"policies": POLICIES, "missions": 8},
-    "explorer": {"policies": POLICIES, "missions": 8, "design": _CORNERS},
     "sweet-spot": {"policies": POLICIES, "selection": RULE, "design": _CORNERS},
     "pads": {"missions": 8, "logged": 2, "design": grid(uavs=[2, 4], pads=[1, 2, 4])},
     "age": {"missions": 4, "design": grid(uavs=[1, 2], arrival_rate=[0.1, 0.5])},

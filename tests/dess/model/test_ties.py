@@ -8,6 +8,7 @@ from dess.model import channel
 from dess.model.state import constants_of
 from dess.policies.planner import rates
 from dess.scenario.scenario import ScenarioSpace
+from tests.dess.model.flights import flown, rows_of
 
 CELLS = [[x, y] for x in range(13) for y in range(13)]
 SEA = {
@@ -33,6 +34,16 @@ def test_of_nodes_at_the_same_distance_the_first_is_served(slots):
                 ties += (squares == squares.min()).sum() > 1
                 assert event.node == squares.argmin(), (event.x, event.y)
     assert ties > 100
+
+
+def test_of_nodes_on_a_circle_the_first_with_data_is_served():
+    """The search draws eight nodes at a time, and the circle has twelve."""
+    lattice = range(-5, 6)
+    circle = [[6 + x, 6 + y] for x in lattice for y in lattice if x**2 + y**2 == 25]
+    alone = {"zone": [6, 6, 1, 1], "uavs": 1, "flying_time": 80, "initial_data": 1e-3}
+    space = ScenarioSpace.model_validate(SEA | alone | {"nodes": circle})
+    served = rows_of(flown(space, "")[1], "communication", "node")
+    assert served == [*range(12)]
 
 
 @pytest.mark.parametrize("slots", [3, 4, 5, 7])

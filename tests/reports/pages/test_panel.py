@@ -48,9 +48,11 @@ from dess.reports.pages.templates import fill_page
 from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
+from tests.analysis.small import SCENARIO, SHEET
 from tests.flown import Engine
 
 PAPER = load_scenario("paper")
+SMALL_SHEET = ScenarioSpace.of(**SCENARIO | SHEET)
 SEED = 7
 MISSIONS = 120  # of a run
 PATIENCE = 60_000  # ms
@@ -158,9 +160,9 @@ def test_failures_of_a_sheet_are_a_setting_in_its_words():
 
 
 def test_where_one_sheet_has_no_failures_the_sides_differ_by_what_follows_from_the_other():
-    sea = load_scenario("jade-bight")
-    failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "50 h", "data_sheet.repair": "2 h"})
-    panel = panels._panel_of(sea, failing, "jade-bight", ["greedy"], SEED, {})
+    sea = SMALL_SHEET
+    failing = ScenarioSpace.of(sea, **{"data_sheet.mtbf": "10 h", "data_sheet.repair": "1 h"})
+    panel = panels._panel_of(sea, failing, "small", ["greedy"], SEED, {})
     baseline, variation = panel.spaces
     settings = dict(panel_settings.settings_of(baseline, variation))
     assert not [key for key, values in settings.items() if values[0] == values[-1]]
@@ -247,16 +249,12 @@ def test_any_variation_has_a_panel_or_a_sentence(baseline, variation):
 
 def test_a_panel_says_that_it_has_no_requirements_of_the_worst_node():
     """A fleet that keeps only the others would be called right."""
-    space = load_scenario("jade-bight")
+    space = SMALL_SHEET
     required = [Requirement(metric_of(name), 0.5) for name in ("success", "least")]
-    panel = str(
-        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required).data
-    )
+    panel = str(make_panel(space, space, "small", ["greedy"], SEED, requirements=required).data)
     assert "since it does not know what is collected of each node" in panel
     assert '<option value="success" selected>' not in panel
-    panel = str(
-        make_panel(space, space, "jade-bight", ["greedy"], SEED, requirements=required[:1]).data
-    )
+    panel = str(make_panel(space, space, "small", ["greedy"], SEED, requirements=required[:1]).data)
     assert '<option value="success" selected>' in panel
 
 

@@ -8,6 +8,7 @@ from tests.analysis.small import write_years
 from tests.reports.small import said_by
 
 YEARS = {"years": 2}
+CALM_MONTHS = (1, 4, 6, 9)  # years of few windows, which are simulated sooner
 
 
 def titles_of(report):
@@ -17,13 +18,13 @@ def titles_of(report):
 
 
 def test_the_page_of_a_search_has_the_calendar_the_years_and_what_decides(tmp_path):
-    scenario = write_years(tmp_path)
+    scenario = write_years(tmp_path, calm=CALM_MONTHS)
     question = sweep_question(
         {"uavs": (2,)},
         scenario,
         ["greedy"],
         prices={"uav": 20_000, "years": 5},
-        requirements={"age": "100 h"},
+        requirements={"age": "5000 h"},
         folder=tmp_path / "results",
         **YEARS,
     )
@@ -47,8 +48,9 @@ def test_the_page_of_a_search_has_the_calendar_the_years_and_what_decides(tmp_pa
 
 
 def test_the_page_of_settings_in_years_ranks_them_by_age(tmp_path):
+    scenario = write_years(tmp_path, calm=CALM_MONTHS)
     question = sweep_question(
-        {"uavs": (1, 2)}, write_years(tmp_path), ["greedy"], folder=tmp_path / "results", **YEARS
+        {"uavs": (1, 2)}, scenario, ["greedy"], folder=tmp_path / "results", **YEARS
     )
     found = question.ask()
     report = make_study_report(found)
