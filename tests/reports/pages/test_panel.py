@@ -391,7 +391,7 @@ def test_the_page_flies_with_the_trained_policy_of_its_answer(visit, tmp_path):
     about = {"costs": PRICES, "requirements": [required], "search": search}
     varied = {"uavs": [1, 2], "pads": [1]}
     panel = make_panel(space, space, "paper", [NETWORK], SEED, varied=varied, **about)
-    assert "cannot simulate" not in panel.data
+    assert "which this page cannot simulate" not in panel.data
     assert panel.data.count('id="panel-network"') == panel.data.count('id="panel-module"') == 1
     shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
     path = tmp_path / "page.html"
@@ -399,13 +399,16 @@ def test_the_page_flies_with_the_trained_policy_of_its_answer(visit, tmp_path):
     opened = visit(path, 390)
     tab = opened.page
     assert tab.locator("[name=a-policy]").input_value() == NETWORK
+    tab.locator("summary", has_text="Settings").press("Enter")
+    tab.locator("[name=b-policy]").select_option("greedy")
     said = run(tab)
     assert f"first {CHECKED} missions of the page's baseline are the same as those of Py" in said
     mean = 100 * means_of(2, NETWORK, pads=1)[PRODUCT]
     assert cells_of(tab, metric_of(PRODUCT).name)[0].startswith(f"{mean:.1f} % [")
     assert "The cheapest is 2 UAVs, 1 pad" in str(fill_grid(tab).text_content())
     tab.get_by_role("button", name="worst of B").click()
-    assert tab.locator("[data-panel=mission-command]").text_content().count(f"--policy {NETWORK}")
+    commands = str(tab.locator("[data-panel=mission-command]").text_content())
+    assert re.findall(r"--policy (\w+)", commands) == [NETWORK, "greedy"]
     assert opened.complaints == []
 
 
