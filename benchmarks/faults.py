@@ -257,6 +257,14 @@ ORACLES = {
     "plain_sets": ("tests/dess/envs/observations/test_sets.py",),
     "tiny_sea": ("tests/analysis/bound/test_optimum.py", "tests/analysis/bound/test_prices.py"),
     "guard": ("tests/dess/model/guard/test_guard.py",),
+    # No oracle, but tests of one rule each, which catch what the auditor cannot see.
+    "single rules": (
+        "tests/dess/model/test_engines.py",
+        "tests/dess/model/test_randomness.py",
+        "tests/dess/model/test_ties.py",
+        "tests/dess/physics/test_fleet.py",
+        "tests/analysis/results/test_event_log.py",
+    ),
 }
 
 

@@ -142,8 +142,7 @@ def pool(width: int) -> Any:
             highest = [
                 cgutils.alloca_once_value(builder, ir.Constant(narrow, None)) for _ in chunks
             ]
-            half = ir.Constant(wide, [2**14] * size)
-            fifteen = ir.Constant(wide, [15] * size)
+            fourteen, one = (ir.Constant(wide, [number] * size) for number in (14, 1))
             with cgutils.for_range(builder, args[4], intp=_I64) as loop:
                 row = builder.zext(_load(builder, rows_at, loop.index, _I32), _I64)
                 factor = builder.sext(_load(builder, factors_at, row, _I16), _I32)
@@ -151,8 +150,10 @@ def pool(width: int) -> Any:
                 for first, box in zip(chunks, highest, strict=True):
                     place = builder.add(builder.mul(row, _I64(width)), _I64(first))
                     value = builder.sext(_load(builder, values_at, place, _I16, size), wide)
-                    product = builder.add(builder.mul(value, factor), half)
-                    value = builder.trunc(builder.ashr(product, fifteen), narrow)
+                    # In this order, it is one instruction of x86 and of WebAssembly.
+                    product = builder.lshr(builder.mul(value, factor), fourteen)
+                    value = builder.lshr(builder.add(product, one), one)
+                    value = builder.trunc(value, narrow)
                     before = builder.load(box)
                     is_higher = builder.icmp_signed(">", value, before)
                     builder.store(builder.select(is_higher, value, before), box)

@@ -1,8 +1,8 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
 ``config.json`` describes the weights (``dess.policies.learner.config``) and has their checksum. A
-policy for any sea acts with ``integers.safetensors``, which was made of weights with the checksum
-that it has (``dess.policies.learner.calibration``).
+policy for any sea acts with ``integers.safetensors``, which was made of these weights
+(``dess.policies.learner.calibration``) and has a checksum of both.
 """
 
 import copy
@@ -56,7 +56,7 @@ from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 
 INTEGERS = "integers.safetensors"
-_MODEL_SUM = "model_sha256"  # the array with the checksum of the weights that integers are made of
+_SUM = "sha256"  # the array with the checksum of integers and of the weights they are made of
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
 # The encoder and the network of each kind of observation.
@@ -176,7 +176,7 @@ def load_teacher(folder: Path) -> tuple[LearnedPolicy, Arrays, TrainingConfig]:
     """
     content, description = _read_folder(folder)
     described = description.model_dump_json()
-    policy = copy.copy(_make_cached_policy(folder, content, described, b""))
+    policy = copy.copy(_make_cached_policy(folder, content, described, None))
     return policy, _parse_weights(content, folder / MODEL), description.training
 
 
@@ -191,31 +191,34 @@ def save_integers(folder: Path, integers: Integers) -> None:
     Raises:
         InputError: If the file cannot be written.
     """
-    arrays = integers._asdict() | {_MODEL_SUM: _sum_of(read_bytes(folder / MODEL, MODEL_LIMIT))}
+    arrays = integers._asdict()
+    arrays[_SUM] = _sum_of(arrays, read_bytes(folder / MODEL, MODEL_LIMIT))
     write_file(folder / INTEGERS, save(make_contiguous(arrays)))
 
 
 def _parse_integers(content: bytes, model: bytes, path: Path) -> Integers | None:
-    """The integers in the content of a file; None if they were made of other weights.
+    """The integers in the content of a file; None without the checksum for these weights.
 
     Raises:
-        InputError: If they are damaged.
+        InputError: If it is no file of integers.
     """
     try:
         arrays = load(content)
     except (SafetensorError, ValueError, KeyError) as error:
         raise describe_damage(path, error) from None
-    require_same_forms(arrays, integer_forms() | {_MODEL_SUM: _sum_of(model)}, str(path))
-    if not np.array_equal(arrays.pop(_MODEL_SUM), _sum_of(model)):
+    forms = integer_forms() | {_SUM: np.empty(32, np.uint8)}
+    require_same_forms(arrays, forms, str(path))
+    expected = arrays.pop(_SUM)
+    if not np.array_equal(expected, _sum_of(arrays, model)):
         return None
     integers = Integers(**arrays)
     check_integers(integers, path)
     return integers
 
 
-def _sum_of(model: bytes) -> np.ndarray:
-    """The checksum of a file of weights, as an array."""
-    return np.frombuffer(hashlib.sha256(model).digest(), np.uint8)
+def _sum_of(integers: Arrays, model: bytes) -> np.ndarray:
+    """The checksum of integers and of the file of weights that they are made of, as an array."""
+    return np.frombuffer(bytes.fromhex(hash_arrays(_hash_content(model), integers)), np.uint8)
 
 
 def read_weights(folder: Path) -> Arrays:
@@ -243,8 +246,17 @@ def _read_folder(folder: Path) -> tuple[bytes, Description]:
 
 
 @lru_cache(maxsize=4)
-def _make_cached_policy(folder: Path, content: bytes, text: str, integers: bytes) -> LearnedPolicy:
-    """The policy of these weights and their description; every process loads one many times."""
+def _make_cached_policy(
+    folder: Path, content: bytes, text: str, integers: bytes | None
+) -> LearnedPolicy:
+    """The policy of these weights and their description; every process loads one many times.
+
+    Args:
+        folder: The folder, for messages.
+        content: The file of weights.
+        text: The description.
+        integers: The file of integers, empty if there is none; None to act in floats.
+    """
     path = folder / MODEL
     where = folder / CONFIG
     description = Description.model_validate_json(text)
@@ -278,6 +290,11 @@ def _make_cached_policy(folder: Path, content: bytes, text: str, integers: bytes
             f"{folder}: this training is not finished ({ticks:,} of {config.ticks:,} ticks); the "
             "policy acts with the weights that it has so far; continue with "
             + resume_command(config, name, folder)
+        )
+    elif integers is not None and has_integers(config) and not parsed:
+        _log_once(
+            f"{folder}: there are no integers of these weights, so the policy acts in floats, more "
+            f"slowly; make them with python -m dess.policies.learner.calibration {folder}"
         )
     return policy
 

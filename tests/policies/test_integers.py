@@ -17,6 +17,7 @@ from dess.model.channel import world_of
 from dess.model.state import constants_of
 from dess.physics.chart import NO_FLY
 from dess.policies.integers import HIDDEN, Integers, decide
+from dess.policies.learner.calibration import DRAWN, drawn_sheet
 from dess.policies.learner.trained import load_policy
 from dess.policies.network import SetNetwork, weight_shapes
 from dess.policies.quantization import quantize
@@ -122,3 +123,35 @@ def test_missions_are_the_same_in_any_batch_in_threads_and_in_both_engines():
         ]
         for parts in zip(*records, strict=True):
             assert len({part.tobytes() for part in parts}) == 1
+
+
+class _Watch:
+    """Flies as a policy, and counts its activations that are clipped."""
+
+    name = "watch"
+
+    def __init__(self, policy) -> None:
+        self.policy = policy
+        self.plain = PlainIntegers(policy._network._integers)
+        self.clipped = self.activations = self.slots = 0
+
+    def act(self, view):
+        self.slots += 1
+        if self.slots % 10 == 0:
+            states = compact_states(view.state, view.world.chart, True, view.ways)
+            for rows, encoder in self.policy.rows_by_sea(view):
+                parts = encoder.encode(states, view.mission[rows], view.uav[rows])
+                result = self.plain(*parts)
+                self.clipped += sum(result.clipped.values())
+                self.activations += result.activations
+        return self.policy.act(view)
+
+
+def test_next_to_no_activation_is_clipped_in_missions_of_sheets():
+    """Neither for a lone UAV, nor on a sheet that no calibration has seen."""
+    watch = _Watch(load_policy(TRAINED / "any"))
+    for uavs in (1, 3):
+        simulate_batch(load_scenario("jade-bight", uavs=uavs), watch, 20261214, 2)
+    simulate_batch(drawn_sheet(DRAWN + 1), watch, 20261214, 2)
+    assert watch.activations > 1_000_000
+    assert watch.clipped <= watch.activations / 100_000

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import random
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from dess.model.batch import simulate_batch
 from dess.policies.learner import trained
 from dess.policies.learner.config import CONFIG, MODEL, read_description
 from dess.policies.learner.dqn import DQNTraining
-from dess.policies.learner.trained import load_policy, save_policy
+from dess.policies.learner.trained import INTEGERS, load_policy, load_teacher, save_policy
+from dess.policies.registry import TRAINED
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import CPU, Killed, kill_after, refusal_of, tiny
 
@@ -175,3 +177,21 @@ def test_a_policy_that_is_replaced_while_it_is_read_is_read_again(training, fold
     old = load_policy(folder).weights
     monkeypatch.setattr(trained, "read_description", late)
     assert load_policy(folder).weights != old
+
+
+def test_integers_that_are_damaged_or_of_other_weights_are_not_used(tmp_path, caplog):
+    folder = tmp_path / "any"
+    shutil.copytree(TRAINED / "any", folder)
+    assert load_policy(folder).weights == load_policy(TRAINED / "any").weights
+    path = folder / INTEGERS
+    content = path.read_bytes()
+    in_floats = load_teacher(folder)[0].weights
+    assert in_floats != load_policy(folder).weights and not caplog.messages
+    for position in (len(content) // 2, len(content) - 1):
+        path.write_bytes(
+            content[:position] + bytes([content[position] ^ 1]) + content[position + 1 :]
+        )
+        assert load_policy(folder).weights == in_floats
+    assert "there are no integers of these weights" in caplog.text
+    path.write_bytes(content[:-1])
+    assert refusal_of(load_policy, folder).startswith(f"{path}: damaged")
