@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import wasmtime
 
-from dess.analysis.wasm.entry import ARRAYS, WORDS
 from dess.analysis.wasm.image import EMPTY, Image, make_image
 from dess.analysis.wasm.module import read_module
+from dess.analysis.wasm.table import ARRAYS, WORDS
 from dess.model.record import Records
 from dess.scenario.scenario import ScenarioSpace
 

@@ -2,17 +2,11 @@
 
 The module flies missions with the functions of the batch engine (``rules.launch``,
 ``heuristics.choose_action``, ``rules.run_slot``, ``record.write_record``); the loop around them is
-here. Its arrays lie where its caller has put them: ``table`` has five int64 for each of ``ARRAYS``,
-an address and up to four sizes. ``dess.analysis.wasm.image`` makes the arrays of a scenario.
+here. ``dess.analysis.wasm.table`` says where its arrays lie.
 """
-
-from collections import namedtuple
-from typing import Any
 
 import numpy as np
 from numba import carray, types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from dess.analysis.stats.sequences import (
     SEQUENCE,
@@ -21,27 +15,48 @@ from dess.analysis.stats.sequences import (
     sequence_ends,
     start_sequence,
 )
-from dess.base.kernels import kernel
-from dess.model import rules
-from dess.model.channel import BATCH, Scratch, World
-from dess.model.guard.parking import parking_memory
-from dess.model.record import (
-    MISSION_RECORD,
-    NODE_RECORD,
-    OPERATIONS,
-    UAV_RECORD,
-    Records,
-    write_record,
+from dess.analysis.wasm.table import (
+    AT,
+    array1,
+    array2,
+    array3,
+    array4,
+    chart_in,
+    integers_in,
+    pointer,
+    reach_in,
+    records_in,
+    scratch_in,
+    sea_in,
+    starts_in,
+    state_in,
+    tables_in,
+    world_in,
 )
-from dess.model.state import MISSION, SENSOR, UAV, Starts, State
+from dess.base.kernels import kernel
+from dess.envs.observations import states as compact
+from dess.envs.observations.sets import fill_sea, fill_tables
+from dess.envs.observations.states import CompactStates, active_rows, fill_states
+from dess.model import rules
+from dess.model.guard.moves import guide
+from dess.model.guard.parking import parking_memory
+from dess.model.record import OPERATIONS, UAV_RECORD, write_record
+from dess.model.state import MISSION, UAV
 from dess.model.ways import FAR as _FARTHEST
-from dess.physics.chart import FAR, Chart, fill_ways, neighbours_of, spread_costs
+from dess.physics.chart import FAR, fill_ways, neighbours_of, spread_costs
 from dess.physics.energy import fill_move_costs
 from dess.physics.landing import is_over
-from dess.policies.heuristics import UNGUARDED, choose_action, choose_at_random
+from dess.policies.heuristics import KINDS, UNGUARDED, choose_action, choose_at_random
+from dess.policies.integers import decide
 
-_F8, _I8, _I4, _I2, _I1 = np.float64, np.int64, np.int32, np.int16, np.int8
-_B1 = np.bool_
+_F8, _I8, _I4 = np.float64, np.int64, np.int32
+# Compiled functions take names, not attributes, as types.
+_MISSION, _UAV, _SEQUENCE = MISSION, UAV, SEQUENCE
+_NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not have
+# The trained policy that the module has, and the numbers of all policies.
+NETWORK = "any"
+POLICIES = KINDS | {NETWORK: len(KINDS)}
+_NETWORK = POLICIES[NETWORK]
 # The metrics of missions, in the order of the columns of ``values``: those of each mission, what
 # extended scenarios measure (nan where one does not), and the cost (nan without prices).
 METRICS = (
@@ -60,190 +75,32 @@ PRICES = (
 # The sums of ``totals``, for each metric over the missions that have it.
 TOTALS = ("count", "sum", "squares", "least", "most")
 
-# The arrays by name: the type of their entries and the number of their axes. B is the number of
-# missions of a call, I that of UAVs, K that of nodes; there is the state of one mission. MISSION is
-# right for scenarios without sections, too: they give the same records with it.
-ARRAYS: dict[str, tuple[Any, int]] = {
-    "missions": (MISSION, 1),
-    "uavs": (UAV, 2),
-    "residual": (_F8, 2),
-    "sensors": (SENSOR, 2),
-    "teeth": (_I4, 2),
-    "constants": (MISSION, 1),  # from here on those of ``Starts``
-    "ranges": (_I8, 3),
-    "types": (UAV, 2),
-    "data": (_F8, 3),
-    "rates": (_F8, 2),
-    "ages": (_F8, 2),
-    "silent": (_B1, 2),
-    "nodes": (_I8, 2),  # of ``World``
-    "mean_snr": (_F8, 2),
-    "order": (_I2, 2),
-    "means": (_F8, 3),
-    "zones": (_I1, 2),  # of ``Chart``
-    "parking": (_I8, 2),
-    "sizes": (_I8, 1),
-    "nearest": (_I4, 2),
-    "ways": (_I2, 2),
-    "batches": (BATCH, 2),  # of ``Scratch``
-    "search": (_I8, 2),
-    "arrivals": (_F8, 1),
-    "reach": (_I4, 4),  # the tables of ``Ways.reach`` and ``Ways.home`` for its only energy
-    "ways_home": (_I4, 4),
-    "circuit": (_I8, 1),  # of ``tour``
-    "policies": (_I8, 1),  # (I,) the policy of each UAV
-    "actions": (_I8, 1),  # (I,) what a UAV has decided in this slot, -1 if it was not asked
-    "mission_records": (MISSION_RECORD, 1),  # of ``Records``
-    "uav_records": (UAV_RECORD, 2),
-    "operations": (OPERATIONS, 1),
-    "node_records": (NODE_RECORD, 2),  # none: no page shows them
-    "prices": (_F8, 1),
-    "uav_prices": (_F8, 1),  # (I,) of UAVs whose types have prices, nan for those of ``prices``
-    "full_packs": (_F8, 1),  # (I,) the full battery of each UAV, its reserve included [%]
-    "factors": (_F8, 1),  # of the metrics, where their unit is that of a data sheet
-    "values": (_F8, 2),  # (B, METRICS)
-    "baseline": (_F8, 2),  # (B, METRICS) values of other missions with the same replications
-    "totals": (_F8, 2),  # (METRICS, TOTALS)
-    # (METRICS, 4) the least and the largest value, by how much a failure changes a value of which
-    # these are not known, and the error of the ends.
-    "bounds": (_F8, 2),
-    "sequences": (SEQUENCE, 1),  # (METRICS,) the confidence sequences of the means
-    # (METRICS, 4) the ends of the intervals of the means, then those of what was seen.
-    "ends": (_F8, 2),
-}
-WORDS = 5  # of the table for each array
-_AT = namedtuple("_At", ARRAYS)(*range(0, WORDS * len(ARRAYS), WORDS))
-_NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not have
-# Compiled functions take names, not attributes, as types.
-_BATCH, _MISSION, _SENSOR, _UAV = BATCH, MISSION, SENSOR, UAV
-_MISSION_RECORD, _UAV_RECORD, _OPERATIONS = MISSION_RECORD, UAV_RECORD, OPERATIONS
-_NODE_RECORD = NODE_RECORD
-_SEQUENCE = SEQUENCE
-
-
-@intrinsic
-def _pointer(typingctx: Any, address: Any) -> Any:
-    """The pointer to an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], cgutils.voidptr_t)
-
-    return types.voidptr(types.int64), generate
-
-
-@kernel
-def _array1(table, at, dtype):
-    return carray(_pointer(table[at]), (table[at + 1],), dtype)
-
-
-@kernel
-def _array2(table, at, dtype):
-    return carray(_pointer(table[at]), (table[at + 1], table[at + 2]), dtype)
-
-
-@kernel
-def _array3(table, at, dtype):
-    shape = (table[at + 1], table[at + 2], table[at + 3])
-    return carray(_pointer(table[at]), shape, dtype)
-
-
-@kernel
-def _array4(table, at, dtype):
-    shape = (table[at + 1], table[at + 2], table[at + 3], table[at + 4])
-    return carray(_pointer(table[at]), shape, dtype)
-
-
-@kernel
-def _state(table):
-    return State(
-        _array1(table, _AT.missions, _MISSION),
-        _array2(table, _AT.uavs, _UAV),
-        _array2(table, _AT.residual, _F8),
-        _array2(table, _AT.sensors, _SENSOR),
-        _array2(table, _AT.teeth, _I4),
-    )
-
-
-@kernel
-def _starts(table):
-    return Starts(
-        _array1(table, _AT.constants, _MISSION),
-        _array3(table, _AT.ranges, _I8),
-        _array2(table, _AT.types, _UAV),
-        _array3(table, _AT.data, _F8),
-        _array2(table, _AT.rates, _F8),
-        _array2(table, _AT.ages, _F8),
-        _array2(table, _AT.silent, _B1),
-    )
-
-
-@kernel
-def _chart(table):
-    return Chart(
-        _array2(table, _AT.zones, _I1),
-        _array2(table, _AT.parking, _I8),
-        _array1(table, _AT.sizes, _I8),
-        _array2(table, _AT.nearest, _I4),
-        _array2(table, _AT.ways, _I2),
-        None,  # grids on which not all cells have a row of ways need more memory than a page has
-    )
-
-
-@kernel
-def _world(table):
-    return World(
-        _array2(table, _AT.nodes, _I8),
-        _array2(table, _AT.mean_snr, _F8),
-        _array2(table, _AT.order, _I2),
-        _array3(table, _AT.means, _F8),
-        _chart(table),
-    )
-
-
-@kernel
-def _scratch(table):
-    return Scratch(
-        _array2(table, _AT.batches, _BATCH),
-        _array2(table, _AT.search, _I8),
-        _array1(table, _AT.arrivals, _F8),
-    )
-
-
-@kernel
-def _records(table):
-    return Records(
-        _array1(table, _AT.mission_records, _MISSION_RECORD),
-        _array2(table, _AT.uav_records, _UAV_RECORD),
-        _array1(table, _AT.operations, _OPERATIONS),
-        _array2(table, _AT.node_records, _NODE_RECORD),
-    )
-
-
-@kernel
-def _reach(table):
-    """As ``Ways.reach``: one table, or none where every slot takes one percent."""
-    at = _AT.reach
-    shape = (table[at + 1], table[at + 2], table[at + 3], table[at + 4])
-    return carray(_pointer(table[at]), (min(shape[0], 1), *shape), _I4)
-
 
 @kernel
 def prepare(table):
-    """Fill the tables that follow from the sea: the ways between cells, and the battery home."""
-    chart = _chart(table)
+    """Fill the tables that follow from the sea.
+
+    They are the ways between cells, the battery home, and what the network sees of the sea.
+    """
+    chart = chart_in(table)
     zones = chart.zones
     ways = chart.ways
     if len(ways) > 0:
         ways[:] = FAR
         fill_ways(zones, np.arange(zones.size), ways)
-    mission = _array1(table, _AT.constants, _MISSION)[0]
+    mission = array1(table, AT.constants, _MISSION)[0]
     mission.pads = _count_pads(mission)  # the pads of several zones may have been changed
     moves = np.zeros((4, *zones.shape), np.int64)
     by_cell = moves.reshape((4, zones.size))
     neighbours = neighbours_of(zones)
     nearest = np.zeros(zones.size, np.int32)
-    reach = _array4(table, _AT.reach, _I4)
-    home = _array4(table, _AT.ways_home, _I4)[0]
+    world = world_in(table)
+    sea = sea_in(table)
+    slots = world.means.shape[2]
+    fill_sea(mission, world.mean_snr, slots, sea.rates, sea.constants)
+    fill_tables(zones, world.nodes, tables_in(table))
+    reach = array4(table, AT.reach, _I4)
+    home = array4(table, AT.ways_home, _I4)[0]
     reach[:] = _FARTHEST
     home[:] = _FARTHEST
     parking = chart.parking[:, 1] * zones.shape[1] + chart.parking[:, 0]
@@ -256,6 +113,19 @@ def prepare(table):
                 spread_costs(neighbours, source, by_cell, False, _FARTHEST, costs, nearest)
         costs = home[slots - 1].reshape(zones.size)
         spread_costs(neighbours, parking, by_cell, False, _FARTHEST, costs, nearest)
+
+
+@kernel
+def _look(state, chart, reach, seen):
+    """Write what the network sees of the mission."""
+    missions, uavs, residual = state.missions, state.uavs, state.residual
+    rows_mission, rows_uav = active_rows(missions, uavs)
+    charge, home, safe = guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, True)
+    seen.uavs[:] = 0
+    fill_states(
+        missions, uavs, residual, True, chart, reach, charge, home, safe,
+        seen.missions, seen.uavs, seen.residual,
+    )  # fmt: skip
 
 
 @kernel
@@ -272,36 +142,53 @@ def play(table, first, count, launches, slots):
     Returns:
         How many missions are over.
     """
-    state = _state(table)
-    starts = _starts(table)
-    world = _world(table)
-    scratch = _scratch(table)
-    records = _records(table)
+    state = state_in(table)
+    starts = starts_in(table)
+    world = world_in(table)
+    scratch = scratch_in(table)
+    records = records_in(table)
     nodes = world.nodes
     chart = world.chart
-    reach = _reach(table)
-    ways = _array4(table, _AT.ways_home, _I4)
-    circuit = _array1(table, _AT.circuit, _I8)
-    policies = _array1(table, _AT.policies, _I8)
-    actions = _array1(table, _AT.actions, _I8)
+    reach = reach_in(table)
+    ways = array4(table, AT.ways_home, _I4)
+    circuit = array1(table, AT.circuit, _I8)
+    policies = array1(table, AT.policies, _I8)
+    actions = array1(table, AT.actions, _I8)
     memory = parking_memory(chart, len(actions))
     mission = state.missions[0]
     team = state.uavs[0]
     data = state.residual[0]
     sensors = state.sensors[0]
+    integers = integers_in(table)
+    sea = sea_in(table)
+    tables = tables_in(table)
+    has_network = (policies == _NETWORK).any()
     over = 0
     for row in range(count):
         if launches:
             rules.launch(state, 0, starts, 0, first + row)
+        seen = CompactStates(
+            np.zeros((1, compact.MISSION_COLUMNS), np.int16),
+            np.zeros((1, mission.uavs, compact.UAV_COLUMNS), np.int16),
+            np.zeros((1, len(nodes)), np.float32),
+        )
+        the_mission = np.zeros(mission.uavs, np.int64)
+        whole_team = np.arange(mission.uavs)
+        of_network = np.empty(mission.uavs, np.int64)
         left = slots
         while left > 0 and not is_over(mission):
             left -= 1
             data_left = rules.data_left(mission, data)
+            if has_network:
+                _look(state, chart, reach, seen)
+                decide(seen, the_mission, whole_team, sea, tables, integers, of_network)
             for i in range(mission.uavs):
                 actions[i] = -1
                 if not rules.may_act(team[i]):
                     continue
-                if policies[i] == UNGUARDED:
+                if policies[i] == _NETWORK:
+                    actions[i] = of_network[i]
+                elif policies[i] == UNGUARDED:
                     legal = rules.legal_moves(chart.zones, team[i])
                     actions[i] = choose_at_random(mission, team, i, legal, chart.sizes)
                 else:
@@ -324,16 +211,16 @@ def play(table, first, count, launches, slots):
 @kernel
 def measure(table, count):
     """Write the metrics of the first ``count`` records into ``values``."""
-    missions, uavs, _, _ = _records(table)
+    missions, uavs, _, _ = records_in(table)
     shape = (len(missions), _COST - _MEASURED)
-    operations = carray(_pointer(table[_AT.operations]), shape, _F8)
-    mission = _array1(table, _AT.constants, _MISSION)[0]
-    types = _array2(table, _AT.types, _UAV)[0]
-    values = _array2(table, _AT.values, _F8)
-    factors = _array1(table, _AT.factors, _F8)
-    prices = _array1(table, _AT.prices, _F8)
-    uav_prices = _array1(table, _AT.uav_prices, _F8)
-    packs = _array1(table, _AT.full_packs, _F8)
+    operations = carray(pointer(table[AT.operations]), shape, _F8)
+    mission = array1(table, AT.constants, _MISSION)[0]
+    types = array2(table, AT.types, _UAV)[0]
+    values = array2(table, AT.values, _F8)
+    factors = array1(table, AT.factors, _F8)
+    prices = array1(table, AT.prices, _F8)
+    uav_prices = array1(table, AT.uav_prices, _F8)
+    packs = array1(table, AT.full_packs, _F8)
     pads = _count_pads(mission)
     for row in range(count):
         record = missions[row]
@@ -434,16 +321,16 @@ def _bound_costs(table, bounds):
 
     All UAVs of the largest fleet are lost, and the mission lasts until its horizon.
     """
-    prices = _array1(table, _AT.prices, _F8)
+    prices = array1(table, AT.prices, _F8)
     if len(prices) == 0:
         return
-    mission = _array1(table, _AT.constants, _MISSION)[0]
-    smallest = _array3(table, _AT.ranges, _I8)[0, 0, 0]
-    largest = _array3(table, _AT.ranges, _I8)[0, 0, 1]
+    mission = array1(table, AT.constants, _MISSION)[0]
+    smallest = array3(table, AT.ranges, _I8)[0, 0, 0]
+    largest = array3(table, AT.ranges, _I8)[0, 0, 1]
     hour = prices[3]
     missions = prices[5]
     seconds = prices[8]
-    uav_prices = _array1(table, _AT.uav_prices, _F8)
+    uav_prices = array1(table, AT.uav_prices, _F8)
     losses = 0.0
     for i in range(largest):
         losses += _price_of_loss(prices, uav_prices, i)
@@ -455,8 +342,8 @@ def _bound_costs(table, bounds):
 @kernel
 def subtract(table, count):
     """Take ``baseline`` from the first ``count`` rows of ``values``."""
-    values = _array2(table, _AT.values, _F8)
-    baseline = _array2(table, _AT.baseline, _F8)
+    values = array2(table, AT.values, _F8)
+    baseline = array2(table, AT.baseline, _F8)
     for row in range(count):
         for column in range(values.shape[1]):
             values[row, column] -= baseline[row, column]
@@ -469,9 +356,9 @@ def begin(table, is_difference):
     What is known of costs follows from the prices, which a reader of a page may have changed. The
     differences of two settings have the bounds of both, which the caller writes.
     """
-    totals = _array2(table, _AT.totals, _F8)
-    bounds = _array2(table, _AT.bounds, _F8)
-    sequences = _array1(table, _AT.sequences, _SEQUENCE)
+    totals = array2(table, AT.totals, _F8)
+    bounds = array2(table, AT.bounds, _F8)
+    sequences = array1(table, AT.sequences, _SEQUENCE)
     if not is_difference:
         _bound_costs(table, bounds)
     for column in range(len(bounds)):
@@ -494,10 +381,10 @@ def add(table, count):
     They count in ``totals`` and in the confidence sequences, whose intervals are written to
     ``ends``.
     """
-    values = _array2(table, _AT.values, _F8)
-    totals = _array2(table, _AT.totals, _F8)
-    ends = _array2(table, _AT.ends, _F8)
-    sequences = _array1(table, _AT.sequences, _SEQUENCE)
+    values = array2(table, AT.values, _F8)
+    totals = array2(table, AT.totals, _F8)
+    ends = array2(table, AT.ends, _F8)
+    sequences = array1(table, AT.sequences, _SEQUENCE)
     for column in range(values.shape[1]):
         sequence = sequences[column : column + 1]
         add_values(sequence, values[:count, column])

@@ -1,6 +1,6 @@
 """The arrays of a scenario for the WebAssembly module, and what settings change in them.
 
-An image has all arrays of ``entry.ARRAYS``: the bytes of those that Python computes, and the shapes
+An image has all arrays of ``table.ARRAYS``: the bytes of those that Python computes, and the shapes
 of the others. A setting that a page offers is a ``Slider``. If its value stands in some words of
 the arrays, the slider has a recipe, which says where; otherwise it has, for each of its values, the
 bytes that differ. Either way, the arrays are those that Python makes of the changed scenario.
@@ -14,6 +14,7 @@ import math
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,10 @@ from dess.analysis.metrics import metric_of, size_of
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.sequences import SEQUENCE
 from dess.analysis.study.prices import Costs, full_packs_of, has_priced_types
-from dess.analysis.wasm.entry import ARRAYS, METRICS, PRICES, TOTALS
+from dess.analysis.wasm.entry import METRICS, NETWORK, POLICIES, PRICES, TOTALS
+from dess.analysis.wasm.table import ARRAYS
 from dess.base.errors import InputError
+from dess.envs.observations.sets import empty_tables
 from dess.model.channel import Site, empty_scratch, make_world
 from dess.model.record import empty_records
 from dess.model.state import (
@@ -38,7 +41,10 @@ from dess.model.state import (
 from dess.model.view import check_team
 from dess.model.ways import Ways
 from dess.physics.fleet import legs, type_of
-from dess.policies.heuristics import KINDS, plan_circuit
+from dess.policies.heuristics import plan_circuit
+from dess.policies.integers import Integers
+from dess.policies.learner.policy import LearnedPolicy
+from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace
 
 # The arrays of which only the shape is in an image: what missions write, and what ``prepare``
@@ -47,6 +53,8 @@ EMPTY = {
     *("missions", "uavs", "residual", "sensors", "teeth", "order", "means", "ways", "batches"),
     *("arrivals", "reach", "ways_home", "actions", "mission_records", "uav_records"),
     *("operations", "node_records", "values", "baseline", "totals", "sequences", "ends"),
+    *("rates_by_distance", "sea_constants", "node_ways", "zone_ways", "home", "node_home"),
+    *("around", "near", "shares", "parts"),
 }
 SHAPES = EMPTY - {"operations"}  # which begin with nan
 MOST_MEMORY = 2**27  # of an image [bytes]; each worker of a page has its own
@@ -105,7 +113,7 @@ class Image:
     """The arrays of missions of a scenario, and the settings that may change.
 
     Attributes:
-        arrays: The arrays by name, in the order of ``entry.ARRAYS``.
+        arrays: The arrays by name, in the order of ``table.ARRAYS``.
         sliders: The settings.
     """
 
@@ -117,8 +125,13 @@ class Image:
         """The memory that the arrays need [bytes]."""
         return sum(array.nbytes for array in self.arrays.values())
 
+    @property
+    def network(self) -> bytes:
+        """The bytes of the arrays of the network, one behind the other."""
+        return b"".join(self.arrays[name].tobytes() for name in Integers._fields)
+
     def document(self) -> dict[str, Any]:
-        """The image for JSON; bytes are in base64."""
+        """The image for JSON; bytes are in base64. Those of ``network`` are not part of it."""
         return {
             "arrays": [*map(_describe_array, self.arrays, self.arrays.values())],
             "fields": {
@@ -128,7 +141,8 @@ class Image:
             },
             "metrics": [*METRICS],
             "totals": [*TOTALS],
-            "policies": KINDS,
+            "policies": POLICIES,
+            "network": [*Integers._fields],
             "sliders": [*map(_describe_slider, self.sliders)],
         }
 
@@ -136,7 +150,7 @@ class Image:
 def explain_refusal(space: ScenarioSpace, team: Sequence[str]) -> str:
     """One sentence that says why the module cannot fly missions; empty if it can."""
     for name in team:
-        if name not in KINDS:
+        if name not in POLICIES:
             return f"The policy {name} decides in Python."
     if space.needs_events:
         return "Packets that arrive in continuous time need the event engine, which is in Python."
@@ -226,7 +240,8 @@ def _arrays_of(
     reach = np.zeros((0, 0, 0, 0), np.int32)
     if ways.reach is not None and len(ways.reach):
         reach = ways.reach[0]
-    kinds = [KINDS[team[i % len(team)]] for i in range(fleet)]
+    kinds = [POLICIES[team[i % len(team)]] for i in range(fleet)]
+    tables = empty_tables(chart.zones.shape, len(world.nodes), len(chart.sizes))
     arrays = {
         "missions": state.missions,
         "uavs": types_of(space, fleet)[None],
@@ -247,6 +262,11 @@ def _arrays_of(
         "reach": reach,
         "ways_home": ways.home,
         "circuit": plan_circuit(world.nodes, chart),
+        **_network()._asdict(),
+        "rates_by_distance": np.zeros(len(world.mean_snr), np.float32),
+        "sea_constants": np.zeros(6, np.float32),
+        "node_ways": tables.ways,
+        **{name: array for name, array in tables._asdict().items() if name != "ways"},
         "policies": np.array(kinds, np.int64),
         "actions": np.zeros(fleet, np.int64),
         "mission_records": records.missions,
@@ -268,6 +288,14 @@ def _arrays_of(
         name: _without_content(arrays[name]) if name in SHAPES else _without_gaps(arrays[name])
         for name in ARRAYS
     }
+
+
+@cache
+def _network() -> Integers:
+    """The network of the trained policy of the module."""
+    policy = load(NETWORK)
+    assert isinstance(policy, LearnedPolicy) and policy.integers is not None
+    return policy.integers
 
 
 def _without_total(constants: np.ndarray) -> np.ndarray:
@@ -473,7 +501,7 @@ def _describe_array(name: str, array: np.ndarray) -> dict[str, Any]:
     described: dict[str, Any] = {"name": name, "item": array.itemsize, "shape": [*array.shape]}
     if name == "operations":
         described["fill"] = "nan"
-    if name not in EMPTY and array.size:
+    if name not in EMPTY and name not in Integers._fields and array.size:
         described["bytes"] = b64encode(array.tobytes()).decode()
     return described
 

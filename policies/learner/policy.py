@@ -24,19 +24,21 @@ class IntegerNetwork:
     """A network of sets in integers, with which a policy acts."""
 
     def __init__(self, integers: Integers) -> None:
-        self._integers = integers
+        self.integers = integers
 
     def choose_actions(
         self, encoder: Sets, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> np.ndarray:
         """The (R,) allowed actions with the highest values, as ``FloatNetwork``."""
         actions = np.empty(len(missions), np.int64)
-        decide(states, missions, uavs, encoder.sea, encoder.tables, self._integers, actions)
+        decide(states, missions, uavs, encoder.sea, encoder.tables, self.integers, actions)
         return actions
 
 
 class FloatNetwork:
     """A network in floats, with which a policy acts."""
+
+    integers = None
 
     def __init__(self, network: Any, weights: Weights) -> None:
         """Make it of one of the networks of ``dess.policies.network``, with its weights."""
@@ -99,6 +101,11 @@ class LearnedPolicy:
         self._network = network
         self._world: World | None = None  # that of the last missions
         self._encoders: dict[bytes, Any] = {}  # of its seas, by what an encoder reads of them
+
+    @property
+    def integers(self) -> Integers | None:
+        """The network in integers, if the policy acts with one."""
+        return self._network.integers
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view.

@@ -77,6 +77,7 @@ def render_example() -> str:
         data=about["data"],
         missions="1,000",
         module=pack(module),
+        network=pack(b""),  # its policy is a heuristic
         image=pack(json.dumps(about["image"]).encode()),
         script=page_script(EXAMPLE_SCRIPT),
     )

@@ -22,12 +22,11 @@ from dess.analysis.figures import style
 from dess.analysis.metrics import NODES_BEHIND, PRODUCT, choose_units, metric_of
 from dess.analysis.stats.requirement import Requirement
 from dess.analysis.study.prices import Costs
-from dess.analysis.wasm.entry import METRICS
+from dess.analysis.wasm.entry import METRICS, POLICIES
 from dess.analysis.wasm.image import explain_refusal, make_image
 from dess.analysis.wasm.module import read_module
 from dess.base.files.documents import Document
 from dess.base.files.writing import toml_value
-from dess.policies.heuristics import KINDS
 from dess.reports.pages.markdown import write_markdown
 from dess.reports.pages.page import PANEL, hidden_element
 from dess.reports.pages.panel_metrics import (
@@ -140,7 +139,7 @@ class Panel(Document):
             ],
             # What commands have to set beside these settings.
             "fixed": [f"{key}={toml_value(self.given[key])}" for key in fixed],
-            "policies": [name for name in KINDS if name != "random-unguarded"],
+            "policies": [name for name in POLICIES if name != "random-unguarded"],
             "metrics": metrics,
             "prices": [*describe_prices(self.costs)],
             "priced": [*other_prices(self.costs)],
@@ -161,6 +160,7 @@ class Panel(Document):
                 "another.html" if self.is_single else "panel.html",
                 data=data,
                 module=pack(read_module()),
+                network=pack(image.network),
                 image=pack(json.dumps(image.document()).encode()),
                 sides=SIDES,
                 script=page_script(SINGLE_SCRIPT if self.is_single else PANEL_SCRIPT),
@@ -185,9 +185,9 @@ class Panel(Document):
                 "has decided, the page is the evidence."
             )
         return (
-            f"{answer}, which this page cannot simulate: its panel has heuristics alone. The grid "
-            f"is of {self.policy}, which may need another fleet. So its cheapest fleet may differ "
-            "from that of the page, and then both are right, each of its own policy."
+            f"{answer}, which this page cannot simulate. The grid is of {self.policy}, which may "
+            "need another fleet. So its cheapest fleet may differ from that of the page, and then "
+            "both are right, each of its own policy."
         )
 
     def _default_of(self, baseline: ScenarioSpace, key: str) -> Any:
@@ -304,7 +304,7 @@ def _panel_of(
         given={field: value for field, value in dotted(dict(given)).items() if field != SEA},
         baseline=baseline.model_dump(mode="json"),
         variation=variation.model_dump(mode="json"),
-        policy=next((name for name in policies if name in KINDS), "greedy"),
+        policy=next((name for name in policies if name in POLICIES), "greedy"),
         seed=seed,
         module=sha256(read_module()).hexdigest(),
     )

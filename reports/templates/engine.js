@@ -13,7 +13,8 @@ const WORDS = 5; // of the table of arrays, for each array: its address and up t
  * }} Slider
  * @typedef { {
  *     arrays: ArrayOfImage[], fields: Record<string, Record<string, [number, string, number]>>,
- *     metrics: string[], totals: string[], policies: Record<string, number>, sliders: Slider[], isBare?: boolean,
+ *     metrics: string[], totals: string[], policies: Record<string, number>, network: string[], sliders: Slider[],
+ *     isBare?: boolean,
  * }} Image
  * @typedef { {module: WebAssembly.Module, image: Image}} Simulator
  */
@@ -38,8 +39,11 @@ async function unpack(id) {
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+/** @type {(array: ArrayOfImage) => number} */
+const sizeOf = ({item, shape}) => shape.reduce((product, length) => product * length, item);
+
 /**
- * The module and the image that a page contains.
+ * The module and the image that a page contains, with the arrays of the network, which lie one behind the other.
  * @param {string} name - the beginning of the ids of both
  * @returns {Promise<Simulator>}
  */
@@ -47,6 +51,10 @@ async function unpackEngine(name) {
     const module = await WebAssembly.compile(await unpack(`${name}-module`));
     const image = JSON.parse(new TextDecoder().decode(await unpack(`${name}-image`)));
     for (const array of image.arrays) if (array.bytes) array.bytes = bytesOfBase64(array.bytes);
+    const network = await unpack(`${name}-network`);
+    let end = 0;
+    for (const array of image.arrays.filter((other) => image.network.includes(other.name)))
+        array.bytes = network.subarray(end, end += sizeOf(array));
     return {module, image};
 }
 
@@ -73,8 +81,7 @@ class Engine {
         /** @type {Record<string, number>} */
         this.places = {};
         const rows = image.arrays.map((array) => {
-            const size = array.shape.reduce((product, length) => product * length, array.item);
-            this.places[array.name] = this.exports.reserve(size);
+            this.places[array.name] = this.exports.reserve(sizeOf(array));
             return [this.places[array.name], ...array.shape];
         });
         const table = this.view(BigInt64Array, this.exports.arrays(), WORDS * rows.length);
@@ -97,8 +104,7 @@ class Engine {
     }
 
     bytes(name) {
-        const {item, shape} = this.image.arrays.find((array) => array.name === name);
-        return this.view(Uint8Array, this.places[name], shape.reduce((product, length) => product * length, item));
+        return this.view(Uint8Array, this.places[name], sizeOf(this.image.arrays.find((array) => array.name === name)));
     }
 
     floats(name) {

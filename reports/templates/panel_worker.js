@@ -27,7 +27,7 @@ onmessage = ({data}) => {
  */
 function keptEngine({choice: {positions, policy}, prices}) {
     const key = positions.join(" "), {arrays} = simulator.image;
-    const size = arrays.reduce((sum, {item, shape}) => sum + shape.reduce((product, length) => product * length, item), 0);
+    const size = arrays.reduce((sum, array) => sum + sizeOf(array), 0);
     const engine = engines.get(key) ?? new Engine(simulator, positions);
     engines.delete(key);
     for (const other of engines.keys()) if ((engines.size + 1) * size > MOST_MEMORY) engines.delete(other);

@@ -30,10 +30,10 @@ def hash_functions(entries: Mapping[str, tuple[Any, tuple]]) -> str:
     seen = set()
     while waiting:
         function = waiting.pop()
-        name = f"{function.__module__}.{function.__qualname__}"
-        if name in seen:
+        if function in seen:
             continue
-        seen.add(name)
+        seen.add(function)
+        name = f"{function.__module__}.{function.__qualname__}"
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
         lines.append(f"{name} {outline_of(tree, [])}")
         for what, value in _named(tree, function):

@@ -139,7 +139,7 @@ void *memmove(void *to, const void *from, u32 size) {
 // The exports, with arguments that JavaScript has without BigInt.
 
 // Where the caller writes the table of its arrays.
-i64 table[64 * 5];
+i64 table[96 * 5];
 i64 *arrays(void) { return table; }
 
 // Reserve memory for an array, filled with zeros; before the first call of what follows.

@@ -54,6 +54,7 @@ SHEET: dict[str, Any] = {
     },
 }
 HEURISTICS = ("random", "random-unguarded", "nearest", "greedy", "tour", "age")
+ALONE = ("greedy", entry.NETWORK)
 
 
 def assert_same(space: ScenarioSpace, team: str, seed: int, missions: int) -> None:
@@ -72,28 +73,32 @@ def assert_same_records(theirs: Records, records: Records) -> None:
         assert np.isnan(theirs.operations.view(np.float64)).all()
 
 
+@pytest.mark.parametrize("policy", ALONE)
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_the_module_flies_the_missions_of_the_batch_engine(name: str):
+def test_the_module_flies_the_missions_of_the_batch_engine(name: str, policy: str):
     scenario, values = SCENARIOS[name]
     missions = 20 if name == "jade-bight" else 100
-    assert_same(load_scenario(scenario, **values), "greedy", 7, missions)
+    if policy == entry.NETWORK:  # takes ten times as long
+        missions //= 4
+    assert_same(load_scenario(scenario, **values), policy, 7, missions)
 
 
 def test_the_module_has_rates_in_steps_and_messages():
     space = ScenarioSpace.of(**SHEET)
     assert min(space.message_rates) < 1 and max(space.message_rates) > 50 and space.radio.steps
-    assert_same(space, "greedy", 7, 20)
+    for policy in ALONE:
+        assert_same(space, policy, 7, 20)
 
 
-@pytest.mark.parametrize("team", [*HEURISTICS, "greedy,random"])
-def test_the_module_has_all_heuristics_and_teams_of_them(team: str):
+@pytest.mark.parametrize("team", [*HEURISTICS, "greedy,random", f"random,{entry.NETWORK}"])
+def test_the_module_has_all_heuristics_and_teams(team: str):
     assert_same(load_scenario("paper", uavs=3), team, 7, 20)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", HEURISTICS)
+@pytest.mark.parametrize("policy", [*HEURISTICS, entry.NETWORK])
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_a_thousand_missions_of_each_heuristic_are_the_same(name: str, policy: str):
+def test_a_thousand_missions_of_each_policy_are_the_same(name: str, policy: str):
     scenario, values = SCENARIOS[name]
     assert_same(load_scenario(scenario, **values), policy, 1, 1000)
 
@@ -104,8 +109,8 @@ def test_a_thousand_missions_of_each_heuristic_are_the_same(name: str, policy: s
 def test_missions_of_drawn_scenarios_are_the_same(space: ScenarioSpace, seed: int):
     if image.explain_refusal(space, ["age"]):
         return
-    assert_same(space, "age", seed, 3)
-    assert_same(space, "random", seed, 3)
+    for policy in ("age", "random", entry.NETWORK):
+        assert_same(space, policy, seed, 3)
 
 
 def test_a_mission_simulated_slot_by_slot_is_the_same():
@@ -282,16 +287,17 @@ def test_a_slider_makes_the_arrays_that_python_makes_for_its_value():
     assert with_recipe == {"uavs", "pads", "arrival_rate", "max_slots", "charge_rate"}
 
 
-def test_sliders_that_are_moved_together_give_the_records_of_the_changed_scenario():
+@pytest.mark.parametrize("policy", ALONE)
+def test_sliders_that_are_moved_together_give_the_records_of_the_changed_scenario(policy: str):
     values = {"uavs": 6, "pads": 1, "arrival_rate": 0.05, "max_slots": 100}
-    made = image.make_image(load_scenario("paper"), ["greedy"], 7, 10, SETTINGS)
+    made = image.make_image(load_scenario("paper"), [policy], 7, 10, SETTINGS)
     engine = Engine(made)
     for slider in made.sliders:
         if slider.setting in values:
             slider.apply(made.arrays, values[slider.setting])
     engine.lay_out(made)
     engine.call("play", 0.0, 10)
-    records = simulate_batch(load_scenario("paper", **values), policies.load("greedy"), 7, 10)
+    records = simulate_batch(load_scenario("paper", **values), policies.load(policy), 7, 10)
     assert_same_records(engine.records(), records)
 
 

@@ -36,6 +36,7 @@ from dess.analysis.stats.verdict import (
 from dess.analysis.study.cheapest import GROWTH, Cheapest, Setting
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm.entry import METRICS as METRICS_OF_MODULE
+from dess.analysis.wasm.entry import NETWORK
 from dess.analysis.wasm.image import copy_inputs, make_image
 from dess.reports.pages import index, panel_settings
 from dess.reports.pages import panel as panels
@@ -83,17 +84,18 @@ def document(panel, tmp_path_factory) -> Path:
     return path
 
 
-def test_the_hashes_are_those_of_the_records_of_the_module():
+@pytest.mark.parametrize("policy", ["greedy", NETWORK])
+def test_the_hashes_are_those_of_the_records_of_the_module(policy):
     """Each is of the bytes of the mission, of its UAVs, and of what extended scenarios measure."""
     space = load_scenario("paper", uavs=[1, 3], age={"measured": True})
-    engine = Engine(make_image(space, ["greedy"], SEED, PORTION))
+    engine = Engine(make_image(space, [policy], SEED, PORTION))
     engine.call("play", 0.0, PORTION)
     kinds = [kind for kind in engine.records() if len(kind)]
     hashes = [
         sha256(b"".join(kind[row].tobytes() for kind in kinds if len(kind))).hexdigest()
         for row in range(PORTION)
     ]
-    assert hash_missions(space, "greedy", SEED, kinds[1].shape[1])[:PORTION] == hashes
+    assert hash_missions(space, policy, SEED, kinds[1].shape[1])[:PORTION] == hashes
 
 
 def test_every_whole_number_can_be_chosen():
@@ -351,9 +353,9 @@ def cells_of(tab: Tab, name: str) -> list[str]:
     return [str(text) for text in row.locator("td").all_text_contents()]
 
 
-def means_of(uavs: int, policy: str = "greedy") -> dict[str, float]:
+def means_of(uavs: int, policy: str = "greedy", **values: Any) -> dict[str, float]:
     records = simulate_batch(
-        load_scenario("paper", uavs=uavs), policies.load(policy), SEED, MISSIONS
+        load_scenario("paper", uavs=uavs, **values), policies.load(policy), SEED, MISSIONS
     )
     return {metric: float(np.mean(records.missions[metric])) for metric in (*METRICS, HOME)}
 
@@ -380,6 +382,34 @@ def test_the_page_simulates_what_python_does(visit, document):
     )
     assert opened.complaints == []
     assert [url for url in opened.requests if not url.startswith("blob:")] == [document.as_uri()]
+
+
+def test_the_page_flies_with_the_trained_policy_of_its_answer(visit, tmp_path):
+    """Its missions are those of Python, and its grid has the fleet of the search."""
+    space, required = load_scenario("paper", uavs=2, pads=1), Requirement(metric_of(PRODUCT), 0.7)
+    search = Search(policy=NETWORK, fleet="2 UAVs and 1 pad", rule=RULE)
+    about = {"costs": PRICES, "requirements": [required], "search": search}
+    varied = {"uavs": [1, 2], "pads": [1]}
+    panel = make_panel(space, space, "paper", [NETWORK], SEED, varied=varied, **about)
+    assert "which this page cannot simulate" not in panel.data
+    assert panel.data.count('id="panel-network"') == panel.data.count('id="panel-module"') == 1
+    shown = {"title": "A panel", "outcome": "", "library": "", "player": panel.data}
+    path = tmp_path / "page.html"
+    path.write_text(fill_page("mission.html", simulates=True, **shown), "utf-8")
+    opened = visit(path, 390)
+    tab = opened.page
+    assert tab.locator("[name=a-policy]").input_value() == NETWORK
+    tab.locator("summary", has_text="Settings").press("Enter")
+    tab.locator("[name=b-policy]").select_option("greedy")
+    said = run(tab)
+    assert f"first {CHECKED} missions of the page's baseline are the same as those of Py" in said
+    mean = 100 * means_of(2, NETWORK, pads=1)[PRODUCT]
+    assert cells_of(tab, metric_of(PRODUCT).name)[0].startswith(f"{mean:.1f} % [")
+    assert "The cheapest is 2 UAVs, 1 pad" in str(fill_grid(tab).text_content())
+    tab.get_by_role("button", name="worst of B").click()
+    commands = str(tab.locator("[data-panel=mission-command]").text_content())
+    assert re.findall(r"--policy (\w+)", commands) == [NETWORK, "greedy"]
+    assert opened.complaints == []
 
 
 def test_what_is_decided_but_for_a_rare_failure_is_so_in_what_was_seen(visit, document):
