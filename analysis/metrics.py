@@ -213,17 +213,22 @@ class Metric:
 _FIELDS = ScenarioSpace.model_fields
 FAILURE_COST = _FIELDS["reward_quota"].default - _FIELDS["reward_depleted"].default
 
-SUCCESS, RATIO, HOME = "success", "collection_ratio", "home"
-PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
+SUCCESS = "success"
+RATIO = "collection_ratio"
+HOME = "home"
+PRODUCT = "collection_ratio_and_communication"
+REWARD = "reward"
 WINDOWS, LATE = "windows", "late"  # of a year with weather
 AGE, COST = "age", "cost"  # a cost have the missions of a study with prices
 LEAST, OLDEST = "least", "oldest"  # of the node that is served worst, with a data sheet
 COLLECTED = "collected"
 QUEUE = "queue"
 # Of a study with bounds: the bound, and the bound minus the product.
-BOUND, GAP = "upper_bound", "optimality_gap"
+BOUND = "upper_bound"
+GAP = "optimality_gap"
 
-_SLOTS, _DATA = "mission slots", "data units"
+_SLOTS = "mission slots"
+_DATA = "data units"
 # What a unit of a data sheet measures, and how large it is [s], [bit], [m].
 SHEET_UNITS = {
     "min": ("slot", 60.0),
@@ -234,11 +239,13 @@ SHEET_UNITS = {
 # The units of maps, of curves over time and of the player, where there is a data sheet.
 DRAWN_UNITS = {"length": "km", "time": "h", "data": "MB"}
 # The columns of the longest that each mission may last, and that a UAV may wait for a pad in it.
-MOST_SLOTS, MOST_WAITING = "most_slots", "most_waiting"
+MOST_SLOTS = "most_slots"
+MOST_WAITING = "most_waiting"
 # The column of how long nodes were idle before each mission, which their ages begin with.
 IDLE = "idle"
 # The columns of the least and the most that each mission may cost.
-LEAST_COST, MOST_COST = "least_cost", "most_cost"
+LEAST_COST = "least_cost"
+MOST_COST = "most_cost"
 
 
 def _time_metric(
@@ -348,7 +355,8 @@ _KNOWN = {metric.column: metric for metric in _ALL}
 _KNOWN |= {metric.in_units.column: metric.in_units for metric in _ALL}
 
 # The columns of the values of all nodes of a mission, of which a metric has those of the worst one.
-NODE_RATIOS, NODE_AGES = "node_ratios", "node_ages"
+NODE_RATIOS = "node_ratios"
+NODE_AGES = "node_ages"
 NODES_BEHIND = {
     LEAST: NODE_RATIOS,
     OLDEST: NODE_AGES,

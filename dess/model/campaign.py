@@ -151,7 +151,9 @@ class Uav:
     """
 
     def __init__(self, number: int, kind: np.void):
-        self.number, self.kind, self.arrives = number, kind, 0
+        self.number = number
+        self.kind = kind
+        self.arrives = 0
         self.state = kind.copy()
 
     @property
@@ -161,7 +163,8 @@ class Uav:
 
     def replace(self, arrives: int) -> None:
         """Let a new UAV take its place at a time [ms]."""
-        self.state, self.arrives = self.kind.copy(), arrives
+        self.state = self.kind.copy()
+        self.arrives = arrives
 
     def land(self, record: np.void) -> None:
         """Take the battery and the cell with which a window has ended."""
@@ -181,11 +184,13 @@ class Campaign:
             replication: The number of the year among its replications.
         """
         assert space.units
-        self.space, self.replication = space, replication
+        self.space = space
+        self.replication = replication
         self.plan = plan_of(space, years_of(space, seed)[replication])
         self.slot = 1000 * space.units.slot  # [ms]
         self.mission = constants_of(space).view(np.recarray)
-        self.mission.seed, self.mission.replication = seed, replication
+        self.mission.seed = seed
+        self.mission.replication = replication
         self.mission.age_measured = 0
         self.mission.due = 1000 * measured(space.weather.due, "s")[0] / self.slot
         self.rates = np.array(space.node_rates)
@@ -247,7 +252,8 @@ class Campaign:
             return True  # all are new: their cells are drawn when the mission is launched
         for zone, (x0, y0, width, height) in enumerate(self.space.rectangles):
             for cell in range(width * height):
-                x, y = x0 + cell % width, y0 + cell // width
+                x = x0 + cell % width
+                y = y0 + cell // width
                 if (x, y) not in taken:
                     full = uav.state["battery"] or self.mission[0].flying_time
                     place = {"x": x, "y": y, "from_x": x, "from_y": y}
@@ -297,7 +303,9 @@ class Campaign:
         costs[: len(window.costs)] = window.costs
         most = costs[: slowest(self.space.fleet)].max()
         gap = (begin - self.clock) / self.slot
-        mission.max_slots, mission.idle, mission.energy = slots, gap, b
+        mission.max_slots = slots
+        mission.idle = gap
+        mission.energy = b
         mission.slot_costs = costs.reshape(-1)
         mission.dearest_slot = mission.waiting_slot = most
         starts.ranges[b, 0] = len(self.flying)
@@ -326,7 +334,8 @@ class Campaign:
     def end_window(self, record: MissionRecord, state: State, b: int) -> None:
         """Take over what the window of mission ``b`` has ended with."""
         assert record.nodes is not None
-        mission, sensors = state.missions[b], state.sensors[b]
+        mission = state.missions[b]
+        sensors = state.sensors[b]
         nodes = len(self.data)
         newest = np.rint(sensors["newest"][:nodes] * self.slot).astype(np.int64)
         self.totals.arrived += record.nodes["initial"] - self.data  # in the gap before the window
@@ -334,7 +343,8 @@ class Campaign:
         self.totals.count_window(record, mission, sensors["late"], month)
         self.emptied = np.where(newest > 0, self.clock + newest, self.emptied)
         self.clock += round(int(mission["slot"]) * self.slot)
-        self.data, self.silent = record.nodes["residual"].copy(), sensors["silent"].copy()
+        self.data = record.nodes["residual"].copy()
+        self.silent = sensors["silent"].copy()
         self.mission[0].pads_out = mission["pads_out"]
         for uav, u, row in zip(self.flying, state.uavs[b], record.uavs, strict=False):
             self.totals.count_uav(uav.number, row)
@@ -371,14 +381,19 @@ class Campaign:
 
     def _write_year(self, records: Records, row: int, slots: float) -> None:
         """Write the record of a year of so many slots."""
-        year, totals, mission = records.missions[row], self.totals, self.mission[0]
+        year = records.missions[row]
+        totals = self.totals
+        mission = self.mission[0]
         for name in ("seed", "replication", "flying_time", "charge_start", "charge_complete"):
             year[name] = mission[name]
         windows = max(totals.windows, 1)
         year["uavs"], year["slots"] = len(self.fleet), totals.slots  # hours are paid in windows
-        year["success"], year["home"] = totals.success / windows, totals.home / windows
-        year["initial"], year["arrived"] = fsum(totals.initial), fsum(totals.arrived)
-        year["collected"], year["residual"] = totals.lands, fsum(self.data)
+        year["success"] = totals.success / windows
+        year["home"] = totals.home / windows
+        year["initial"] = fsum(totals.initial)
+        year["arrived"] = fsum(totals.arrived)
+        year["collected"] = totals.lands
+        year["residual"] = fsum(self.data)
         year["reward"] = fsum(totals.uavs["reward"])
         year["uav_slots"] = totals.slots_of_uavs("slots_flying", "slots_charging")
         data = year["initial"] + year["arrived"]
@@ -392,8 +407,10 @@ class Campaign:
 
     def _write_nodes(self, nodes: np.ndarray, slots: float) -> None:
         out = nodes[: len(self.data)]
-        out["initial"], out["arrived"] = self.totals.initial, self.totals.arrived
-        out["collected"], out["residual"] = self.totals.collected, self.data
+        out["initial"] = self.totals.initial
+        out["arrived"] = self.totals.arrived
+        out["collected"] = self.totals.collected
+        out["residual"] = self.data
         out["age"] = self.totals.age_area / slots
         out["age_at_end"] = slots - self.emptied / self.slot
 
@@ -401,7 +418,8 @@ class Campaign:
         totals = self.totals
         out["age"] = fsum(totals.age_area) / len(totals.age_area) / slots
         out["late"] = fsum(self.rates * totals.late) / (fsum(self.rates) * slots)
-        out["open"], out["longest_gap"] = self.plan.open_share, self.plan.longest_gap
+        out["open"] = self.plan.open_share
+        out["longest_gap"] = self.plan.longest_gap
         out["windows"] = totals.windows
         hours = np.diff(self.plan.month_ends, prepend=0)
         for name, area, length in zip(AGES_OF_MONTHS, totals.area_of_month, hours, strict=True):
@@ -415,7 +433,8 @@ class Campaign:
             out["queue"] = waited / flown
             out["utilisation"] = charged / (self.space.charging_pads * flown)
         if self.mission[0].has_failures:
-            out["failures"], out["slots_grounded"] = totals.failures, totals.slots_grounded
+            out["failures"] = totals.failures
+            out["slots_grounded"] = totals.slots_grounded
             out["lost"] = totals.lost
 
 

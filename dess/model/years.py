@@ -105,10 +105,12 @@ class Years:
     def __init__(self, campaigns: Sequence[Campaign], world: World):
         """Prepare a place for each campaign; none of them has begun."""
         spaces = [campaign.space for campaign in campaigns]
-        self.campaigns, self.world = campaigns, world
+        self.campaigns = campaigns
+        self.world = world
         self.state = state_of(spaces, len(spaces))
         self.starts = starts_of(spaces)
-        uavs, nodes = self.state.uavs.shape[1], len(world.nodes)
+        uavs = self.state.uavs.shape[1]
+        nodes = len(world.nodes)
         self.scratch = empty_scratch(uavs, nodes)
         speeds = max(slowest(space.fleet) for space in spaces)
         self.ways = WaysOfPlaces(len(spaces), speeds, world.chart)
