@@ -114,9 +114,12 @@ def _spread_out(prices, places, left):
 
 
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
-    """The node that a heuristic chooses."""
+    """The node whose cell is the goal that a heuristic chooses, or -1 for another cell."""
     home = parking_cell(mission, uavs, i, chart, residual.sum())
-    return _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach)
+    cell = _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach)
+    if cell == (home.x, home.y):
+        return -1
+    return next(iter(np.flatnonzero((nodes == cell).all(axis=1))), -1)
 
 
 @kernel

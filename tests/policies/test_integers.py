@@ -132,7 +132,7 @@ class _Watch:
 
     def __init__(self, policy) -> None:
         self.policy = policy
-        self.plain = PlainIntegers(policy._network._integers)
+        self.plain = PlainIntegers(policy._network.integers)
         self.clipped = self.activations = self.slots = 0
 
     def act(self, view):
