@@ -73,6 +73,7 @@ def test_at_most_one_of_a_thousand_drawn_missions_fails():
 
 # --- further zones with few cells ---
 
+WIND = {"strength": 0.8, "direction": 40, "gusts": 0.25, "seed": 3}
 # Scenarios whose second zone is replaced by a small one, and how large this is by its cells.
 TIGHT: dict[str, tuple[str, dict[str, Any]]] = {
     "in the air": ("paper", {}),
@@ -80,7 +81,8 @@ TIGHT: dict[str, tuple[str, dict[str, Any]]] = {
     "no quota": ("paper", {"landing": True, "quota": 0, "max_slots": 250}),
     "sheet": ("jade-bight", {"data_sheet": {"horizon": "90 min"}}),
     "LoRa": ("jade-lora", {"data_sheet": {"horizon": "90 min"}}),
-    "wind": ("paper", {"wind": {"strength": 0.8, "direction": 40, "gusts": 0.25, "seed": 3}}),
+    "wind": ("paper", {"wind": WIND}),
+    "wind landing": ("paper", {"landing": True, "quota": 0, "max_slots": 250, "wind": WIND}),
 }
 SIZES = {1: (1, 1), 2: (2, 1), 3: (1, 3), 4: (2, 2)}
 # Seas of each kind, size of zone and fleet, and missions on each of them.

@@ -179,7 +179,7 @@ def _sort(mission, uavs, turns, order):
         if not uavs[j].active:
             continue
         place = count
-        while place > 0 and _chooses_before(uavs, j, order[place - 1], turns):
+        while place > 0 and _chooses_before(mission, uavs, j, order[place - 1], turns):
             order[place] = order[place - 1]
             place -= 1
         order[place] = j
@@ -188,12 +188,14 @@ def _sort(mission, uavs, turns, order):
 
 
 @inlined
-def _chooses_before(uavs, j, other, turns):
+def _chooses_before(mission, uavs, j, other, turns):
     """Whether UAV ``j`` chooses before another with a lower index.
 
     In the plan of pads, who can ask sooner comes sooner, and needs the cell that it can reach then.
+    Where missions end on the ground there is none: a charged UAV in a zone makes room for those
+    that come, so it has to know their cells.
     """
-    are_planned = turns[j].zone >= 0 and turns[other].zone >= 0
+    are_planned = turns[j].zone >= 0 and turns[other].zone >= 0 and not lands(mission)
     if are_planned and turns[j].asks != turns[other].asks:
         return turns[j].asks < turns[other].asks
     return uavs[j].battery < uavs[other].battery

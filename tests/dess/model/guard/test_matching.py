@@ -13,7 +13,7 @@ from dess.model.state import END_NAMES, HOVER
 from tests import compiled
 from tests.dess.envs.episodes import placed
 from tests.dess.model.guard.test_guard import _mask
-from tests.drawn import EAST, NORTH
+from tests.drawn import EAST, NORTH, SOUTH
 
 # A strip of three rows with a zone of a cell for each UAV at its western end, and one of a single
 # cell at its eastern end. Missions end on the ground, and there are no margins but for teammates.
@@ -86,6 +86,17 @@ def test_a_uav_flies_into_the_cell_that_a_teammate_is_told_to_leave():
     assert moves[0, NORTH] and not moves[1, HOVER]
     waiting = inside | {"pad_request": 1}
     assert not _mask(outside, waiting, **sea)[0, NORTH]
+
+
+def test_a_charged_uav_does_not_make_room_by_moving_into_the_cell_that_a_teammate_chose():
+    """A zone of three cells: the teammate counts on one beside it, and it may move to the other."""
+    sea = LANDING | {"zones": [{"cells": [23, 0, 1, 3], "pads": 1}]}
+    team = [{"x": 22, "y": 1, "battery": 8}, {"x": 23, "y": 1, "battery": 80}, {"x": 0, "y": 0}]
+    state, chart = placed(team, **sea)
+    home = compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)
+    assert (home.x, home.y) == (23, 0)
+    moves = _mask(*team, **sea)[1]
+    assert not moves[NORTH] and moves[SOUTH]
 
 
 def test_in_the_air_a_uav_at_c_s_keeps_its_cell_if_its_zone_has_one_for_all_that_come():
