@@ -139,7 +139,8 @@ def _changed_fields(space: ScenarioSpace) -> Iterator[dict[str, Any]]:
     yield {"data_sheet.spares": space.data_sheet.spares + 1}
     if space.weather.operating != ALWAYS:
         yield {_OPERATING: ALWAYS}
-    yield {_CALM: True}
+    if not space.weather.calm:
+        yield {_CALM: True}
     for name in space.weather.limits:
         yield {_LIMITS: {kept: v for kept, v in space.weather.limits.items() if kept != name}}
     cruise = space.data_sheet.number("cruise")

@@ -155,13 +155,13 @@ def _weather_of(space: ScenarioSpace, wind: str) -> dict[str, str]:
     speed = space.data_sheet.max_speed
     known = {ALWAYS: "round the clock", DAYLIGHT: "by daylight"}
     operating = known.get(weather.operating) or f"{weather.operating}, solar time"
-    of_hours = f"of the hour, from {weather.height} to the altitude by a power law (0.11); UAVs "
-    of_hours += f"fly if {speed} through the air are enough for all moves"
+    wind = f"of the hour, from {weather.height} to the altitude by a power law (0.11); UAVs "
+    wind += f"fly if {speed} through the air are enough for all moves"
+    if weather.calm:
+        wind = "none: UAVs fly as in still air in all hours whose wind is known"
     return {
         "weather": f"hour by hour, {weather.path.name}; the same everywhere in the sea",
-        "wind": "none: still air, where the wind of the hours is known"
-        if weather.calm
-        else of_hours,
+        "wind": wind,
         "operating": f"{operating}; limits: {', '.join(limits) or 'none but the wind'}",
         "window": f"open hours in a row, at most {weather.longest}, whose weather policy and "
         "return guard know beforehand; each move takes the most that it takes in one of its hours",
