@@ -349,11 +349,13 @@ function reset() {
     stop();
 }
 
+// At once: a reader may open the settings while the simulator is unpacked.
+find("choices").open = !matchMedia(NARROW).matches;
+
 openPanel((simulator) => {
     crew = new Crew(simulator, (why) => why ? show(why) : schedule());
     runs = new Runs(simulator, choose);
     const isAsked = readAddress();
-    find("choices").open = !matchMedia(NARROW).matches;
     document.querySelectorAll("[data-to=panel]").forEach((/** @type {any} */ link) => { link.hidden = false; });
     document.querySelectorAll("[data-replaced-by=panel]").forEach((element) => element.classList.add("replaced"));
     root.addEventListener("input", stop);
