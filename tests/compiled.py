@@ -10,7 +10,7 @@ from dess.model.state import SENSOR, STEP_X, STEP_Y
 from dess.model.ways import Ways
 from dess.physics import chart
 from dess.physics.chart import FAR, distance, is_open
-from dess.policies import heuristics
+from dess.policies import choices
 
 
 @kernel
@@ -125,7 +125,7 @@ def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
 @kernel
 def _goal(kind, mission, uavs, i, residual, sensors, nodes, chart, home, reach):
     charge = battery.must_charge(mission, uavs[i], rules.data_left(mission, residual))
-    return heuristics._choose_goal(
+    return choices._choose_goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
         home, reach,
     )  # fmt: skip

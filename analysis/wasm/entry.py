@@ -22,7 +22,7 @@ from dess.analysis.wasm.table import (
     array3,
     array4,
     chart_in,
-    integers_in,
+    network_in,
     pointer,
     reach_in,
     records_in,
@@ -34,20 +34,17 @@ from dess.analysis.wasm.table import (
     world_in,
 )
 from dess.base.kernels import kernel
-from dess.envs.observations import states as compact
 from dess.envs.observations.sets import fill_sea, fill_tables
-from dess.envs.observations.states import CompactStates, active_rows, fill_states
 from dess.model import rules
-from dess.model.guard.moves import guide
-from dess.model.guard.parking import parking_memory
 from dess.model.record import OPERATIONS, UAV_RECORD, write_record
 from dess.model.state import MISSION, UAV
 from dess.model.ways import FAR as _FARTHEST
 from dess.physics.chart import FAR, fill_ways, neighbours_of, spread_costs
 from dess.physics.energy import fill_move_costs
 from dess.physics.landing import is_over
-from dess.policies.heuristics import KINDS, UNGUARDED, choose_action, choose_at_random
-from dess.policies.integers import decide
+from dess.policies.choices import NETWORK as _NETWORK
+from dess.policies.flight import fly
+from dess.policies.heuristics import KINDS
 
 _F8, _I8, _I4 = np.float64, np.int64, np.int32
 # Compiled functions take names, not attributes, as types.
@@ -55,8 +52,7 @@ _MISSION, _UAV, _SEQUENCE = MISSION, UAV, SEQUENCE
 _NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not have
 # The trained policy that the module has, and the numbers of all policies.
 NETWORK = "any"
-POLICIES = KINDS | {NETWORK: len(KINDS)}
-_NETWORK = POLICIES[NETWORK]
+POLICIES = KINDS | {NETWORK: _NETWORK}
 # The metrics of missions, in the order of the columns of ``values``: those of each mission, what
 # extended scenarios measure (nan where one does not), and the cost (nan without prices).
 METRICS = (
@@ -116,19 +112,6 @@ def prepare(table):
 
 
 @kernel
-def _look(state, chart, reach, seen):
-    """Write what the network sees of the mission."""
-    missions, uavs, residual = state.missions, state.uavs, state.residual
-    rows_mission, rows_uav = active_rows(missions, uavs)
-    charge, home, safe = guide(missions, uavs, residual, rows_mission, rows_uav, chart, reach, True)
-    seen.uavs[:] = 0
-    fill_states(
-        missions, uavs, residual, True, chart, reach, charge, home, safe,
-        seen.missions, seen.uavs, seen.residual,
-    )  # fmt: skip
-
-
-@kernel
 def play(table, first, count, launches, slots):
     """Fly missions, and write the record of each that is over.
 
@@ -147,62 +130,20 @@ def play(table, first, count, launches, slots):
     world = world_in(table)
     scratch = scratch_in(table)
     records = records_in(table)
-    nodes = world.nodes
-    chart = world.chart
     reach = reach_in(table)
     ways = array4(table, AT.ways_home, _I4)
     circuit = array1(table, AT.circuit, _I8)
     policies = array1(table, AT.policies, _I8)
-    actions = array1(table, AT.actions, _I8)
-    memory = parking_memory(chart, len(actions))
+    network = network_in(table)
     mission = state.missions[0]
-    team = state.uavs[0]
-    data = state.residual[0]
-    sensors = state.sensors[0]
-    integers = integers_in(table)
-    sea = sea_in(table)
-    tables = tables_in(table)
-    has_network = (policies == _NETWORK).any()
     over = 0
     for row in range(count):
         if launches:
             rules.launch(state, 0, starts, 0, first + row)
-        seen = CompactStates(
-            np.zeros((1, compact.MISSION_COLUMNS), np.int16),
-            np.zeros((1, mission.uavs, compact.UAV_COLUMNS), np.int16),
-            np.zeros((1, len(nodes)), np.float32),
-        )
-        the_mission = np.zeros(mission.uavs, np.int64)
-        whole_team = np.arange(mission.uavs)
-        of_network = np.empty(mission.uavs, np.int64)
-        left = slots
-        while left > 0 and not is_over(mission):
-            left -= 1
-            data_left = rules.data_left(mission, data)
-            if has_network:
-                _look(state, chart, reach, seen)
-                decide(seen, the_mission, whole_team, sea, tables, integers, of_network)
-            for i in range(mission.uavs):
-                actions[i] = -1
-                if not rules.may_act(team[i]):
-                    continue
-                if policies[i] == _NETWORK:
-                    actions[i] = of_network[i]
-                elif policies[i] == UNGUARDED:
-                    legal = rules.legal_moves(chart.zones, team[i])
-                    actions[i] = choose_at_random(mission, team, i, legal, chart.sizes)
-                else:
-                    actions[i] = choose_action(
-                        policies[i], mission, team, i, data, data_left, sensors, nodes, circuit,
-                        chart, reach, memory,
-                    )  # fmt: skip
-            for i in range(mission.uavs):  # all have decided before any action is written
-                if actions[i] >= 0:
-                    team[i].action = actions[i]
-            rules.run_slot(state, 0, world, scratch)
+        fly(state, 0, world, scratch, reach, circuit, policies, network, slots)
         if is_over(mission):
             over += 1
-            for i in range(mission.uavs, len(team)):
+            for i in range(mission.uavs, state.uavs.shape[1]):
                 records.uavs[row, i] = _NO_UAV[0]
             write_record(state, 0, ways, records, row)
     return over

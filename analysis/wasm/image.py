@@ -41,7 +41,7 @@ from dess.model.state import (
 from dess.model.view import check_team
 from dess.model.ways import Ways
 from dess.physics.fleet import legs, type_of
-from dess.policies.heuristics import plan_circuit
+from dess.policies.choices import plan_circuit
 from dess.policies.integers import Integers
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.registry import load
@@ -51,7 +51,7 @@ from dess.scenario.scenario import ScenarioSpace
 # fills. They begin with zeros, the records of ``operations`` with nan.
 EMPTY = {
     *("missions", "uavs", "residual", "sensors", "teeth", "order", "means", "ways", "batches"),
-    *("arrivals", "reach", "ways_home", "actions", "mission_records", "uav_records"),
+    *("arrivals", "reach", "ways_home", "mission_records", "uav_records"),
     *("operations", "node_records", "values", "baseline", "totals", "sequences", "ends"),
     *("rates_by_distance", "sea_constants", "node_ways", "zone_ways", "home", "node_home"),
     *("around", "near", "shares", "parts"),
@@ -268,7 +268,6 @@ def _arrays_of(
         "node_ways": tables.ways,
         **{name: array for name, array in tables._asdict().items() if name != "ways"},
         "policies": np.array(kinds, np.int64),
-        "actions": np.zeros(fleet, np.int64),
         "mission_records": records.missions,
         "uav_records": records.uavs,
         "operations": records.operations,

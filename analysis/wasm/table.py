@@ -16,10 +16,12 @@ from numba.extending import intrinsic
 from dess.analysis.stats.sequences import SEQUENCE
 from dess.base.kernels import kernel
 from dess.envs.observations.sets import Sea, Tables
+from dess.envs.observations.states import MISSION_COLUMNS, UAV_COLUMNS, CompactStates
 from dess.model.channel import BATCH, Scratch, World
 from dess.model.record import MISSION_RECORD, NODE_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.model.state import MISSION, SENSOR, UAV, Starts, State
 from dess.physics.chart import Chart
+from dess.policies.flight import Network
 from dess.policies.integers import Integers
 
 _F8, _I8, _I4, _I2, _I1 = np.float64, np.int64, np.int32, np.int16, np.int8
@@ -72,7 +74,6 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "shares": (_F4, 1),
     "parts": (_F4, 1),
     "policies": (_I8, 1),  # (I,) the policy of each UAV
-    "actions": (_I8, 1),  # (I,) what a UAV has decided in this slot, -1 if it was not asked
     "mission_records": (MISSION_RECORD, 1),  # of ``Records``
     "uav_records": (UAV_RECORD, 2),
     "operations": (OPERATIONS, 1),
@@ -254,4 +255,19 @@ def tables_in(table):
         array2(table, AT.near, _F4),
         array1(table, AT.shares, _F4),
         array1(table, AT.parts, _F4),
+    )
+
+
+@kernel
+def network_in(table):
+    """The ``Network``, and room for what it sees of a mission."""
+    return Network(
+        integers_in(table),
+        sea_in(table),
+        tables_in(table),
+        CompactStates(
+            np.zeros((1, MISSION_COLUMNS), np.int16),
+            np.zeros((1, table[AT.uavs + 2], UAV_COLUMNS), np.int16),
+            np.zeros((1, table[AT.residual + 2]), np.float32),
+        ),
     )

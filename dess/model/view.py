@@ -4,7 +4,7 @@ view = View(state, world, mission, uav)   # one row per UAV that must act
 view.own["battery"], view.residual, view.legal
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -232,6 +232,17 @@ def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
             f"the team has {policies} policies, but the largest fleet has {uavs}",
             f"{fleet} at most",
         )
+
+
+def flight_of(team: Sequence[Any]) -> Callable[..., None] | None:
+    """The function that flies a mission to its end in compiled code, if the whole team has it.
+
+    It belongs to the method ``act``, so that a class with another method has none::
+
+        fly(team, state, b, world, scratch, reach)   # mission b of the state
+    """
+    flights = {getattr(policy.act, "fly", None) for policy in team}
+    return flights.pop() if len(flights) == 1 else None
 
 
 def decide(team: Sequence[Any], state: State, world: World, ways: Ways) -> None:

@@ -21,7 +21,7 @@ from dess.model.guard.battery import must_charge
 from dess.model.state import HOVER, STEP_X, State
 from dess.model.view import View
 from dess.physics.landing import lands
-from dess.policies.heuristics import step_towards
+from dess.policies.choices import step_towards
 from dess.policies.planner import fluid
 from dess.policies.planner.rates import RATES_PART, load_rates
 from dess.policies.planner.search import TRIED, empty_workspace, improve_plan

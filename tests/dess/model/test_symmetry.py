@@ -14,7 +14,7 @@ from dess.model.rules import launch
 from dess.model.state import HOVER, State, starts_of, state_of
 from dess.model.view import View
 from dess.model.ways import is_calm
-from dess.policies.heuristics import AGE, GREEDY, NEAREST
+from dess.policies.choices import AGE, GREEDY, NEAREST
 from dess.scenario.scenario import ScenarioSpace
 from tests import compiled
 from tests.dess.model.turns import Turn

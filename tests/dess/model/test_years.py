@@ -13,7 +13,7 @@ from dess.model.campaign import HOUR, MOST_HOURS, Campaign, plan_of, repair_in_g
 from dess.model.channel import world_of
 from dess.model.record import AGES_OF_MONTHS, MissionRecord
 from dess.model.state import BATTERY
-from dess.model.view import decide
+from dess.model.view import View, decide, flight_of
 from dess.model.years import WindowStart, Years, _advance, start_of_window
 from dess.policies import load
 from dess.scenario.rotary_wing import COURSES, RotaryWing, airspeed_along
@@ -97,6 +97,25 @@ def test_the_first_window_of_a_constant_series_is_a_mission_of_its_sheet(write):
     today = ScenarioSpace.of(data_sheet=SHEET | of_sheet, **SEA | {"uavs": 2})
     assert_same(window, simulate(today, GREEDY, 7, start.replication))
     assert window.collected > 0
+
+
+class Slotwise:
+    """A policy of Python, which is asked in every slot."""
+
+    name = "slotwise"
+
+    def act(self, view: View) -> np.ndarray:
+        return GREEDY.act(view)
+
+
+def test_a_year_flown_in_compiled_code_is_that_of_policies_asked_slot_by_slot(write):
+    space = sea(write(first_days(4)), uavs=3, weather={"operating": "always"})
+    tour = load("tour")
+    for compiled, asked in (([GREEDY], [Slotwise()]), ([GREEDY, tour], [Slotwise(), tour])):
+        assert flight_of(compiled) and not flight_of(asked)
+        year, other = (simulate_batch(space, team, 3, 1) for team in (compiled, asked))
+        assert year.missions["collected"] > 0
+        assert_same(year.mission(0), other.mission(0))
 
 
 def test_where_no_hour_is_open_nothing_flies(write):
