@@ -19,7 +19,7 @@ import numpy as np
 
 from dess.base.kernels import inlined
 from dess.model.state import ENERGY_PART, part_of
-from dess.physics.chart import Chart, neighbours_of, read_only, spread_costs
+from dess.physics.chart import NO_FLY, Chart, neighbours_of, read_only, spread_costs
 from dess.physics.energy import ACTIONS, HOVERING, fill_move_costs
 
 FAR = 2**30  # further than any cell
@@ -96,14 +96,31 @@ def _filled(
     if groups * slowest * cells.size > MOST_ENTRIES:
         return read_only(np.zeros((groups, 0, 0, 0), np.int32))
     mission = np.frombuffer(energy, ENERGY_PART)[0]
+    homes = np.frombuffer(parking, np.int64).reshape(groups, -1, 2)
+    if mission["gusts"] == 0 and not (cells == NO_FLY).any():
+        ways = [_straight_ways(homes, _even_costs(mission, s + 1), shape) for s in range(slowest)]
+        return read_only(np.stack(ways, axis=1))
     table = np.full((groups, slowest, cells.size), FAR, np.int32)
     neighbours, nearest = neighbours_of(cells), np.zeros(cells.size, np.int32)
-    homes = np.frombuffer(parking, np.int64).reshape(groups, -1, 2)
     for s in range(slowest):
         moves = move_costs(mission, s + 1, shape).reshape(HOVERING, -1)
         for group, numbers in enumerate(homes[:, :, 1] * shape[1] + homes[:, :, 0]):
             spread_costs(neighbours, numbers, moves, False, FAR, table[group, s], nearest)
     return read_only(table.reshape(groups, slowest, *shape))
+
+
+def _straight_ways(homes: np.ndarray, costs: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(G, H, W) the battery to the nearest of (G, N, 2) cells, where no cell is closed.
+
+    Moves have the same (4,) costs everywhere, so no way is cheaper than one without a detour.
+    """
+    north, east, south, west = costs
+    to_east = homes[..., :1] - np.arange(shape[1])
+    to_south = homes[..., 1:] - np.arange(shape[0])
+    along = np.where(to_east > 0, to_east * east, -to_east * west)
+    across = np.where(to_south > 0, to_south * south, -to_south * north)
+    ways = across[..., :, None].astype(np.int32) + along[..., None, :].astype(np.int32)
+    return np.asarray(ways.min(axis=1))
 
 
 def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) -> np.ndarray:
@@ -112,9 +129,14 @@ def move_costs(mission: np.void, slots_per_cell: int, shape: tuple[int, int]) ->
     if mission["gusts"] > 0:
         fill_move_costs(mission, slots_per_cell, moves)
     else:
-        costs = mission["slot_costs"].reshape(-1, ACTIONS)[slots_per_cell - 1, :HOVERING]
-        moves[:] = slots_per_cell * costs.astype(np.int64)[:, None, None]
+        moves[:] = _even_costs(mission, slots_per_cell)[:, None, None]
     return moves
+
+
+def _even_costs(mission: np.void, slots_per_cell: int) -> np.ndarray:
+    """(4,) what the moves north, east, south and west take, where there are no gusts [% / 1000]."""
+    costs = mission["slot_costs"].reshape(-1, ACTIONS)[slots_per_cell - 1, :HOVERING]
+    return np.asarray(slots_per_cell * costs.astype(np.int64))
 
 
 class WaysOfPlaces:
