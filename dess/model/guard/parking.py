@@ -328,10 +328,20 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         is_far = zone == best_zone and distance(chart, u.x, u.y, x, y) >= way
         if (only >= 0 and zone != only) or (is_calm(reach) and is_far):
             continue
+        cells = distance(chart, u.x, u.y, x, y)
+        if best >= 0 and _price_of_way(mission, u, chart, x, y, cells, reach) > least:
+            continue  # and more with a detour
         cells = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
-        slots = cells * u.slots_per_cell + 1 + margin_slots(mission, u)
-        price = spent + _LATE * late_slots(mission, slots)
+        price = _price_of_way(mission, u, chart, x, y, cells, reach)
         if best < 0 or price < least or (price == least and cells < way):
             best, best_zone, way, least, battery = cell, zone, cells, price, spent
     return best, way, battery
+
+
+@inlined
+def _price_of_way(mission, u, chart, x, y, cells, reach):
+    """The battery of a way of so many cells to a parking cell, and more if it takes too long."""
+    spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
+    slots = cells * u.slots_per_cell + 1 + margin_slots(mission, u)
+    return spent + _LATE * late_slots(mission, slots)
