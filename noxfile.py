@@ -24,8 +24,8 @@ STUDIES = {
     "age": "",
     "planning": "",
     "gap": "--missions 20 --policy greedy --policy ddqn --policy planner",
-    "seas": "--missions 1 --policy any --policy greedy --policy planner-short",
-    "seas-landing seas-horizon": "--missions 1 --policy any --policy greedy",
+    "seas": "--missions 1 --policy generalist --policy greedy --policy planner-short",
+    "seas-landing seas-horizon": "--missions 1 --policy generalist --policy greedy",
 }
 # Runs commands in one process, since each would start workers and import libraries for seconds.
 ONE_AFTER_THE_OTHER = """

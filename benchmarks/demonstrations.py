@@ -1,4 +1,4 @@
-"""The training of ``any`` by imitation: planned missions on generated seas as examples.
+"""The training of ``generalist`` by imitation: planned missions on generated seas as examples.
 
     python -m benchmarks.demonstrations --out runs/imitation
     dess train any --from runs/imitation --out runs/any
@@ -123,7 +123,7 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     space = load_scenario(name, uavs=uavs)
     other = None
     if weights:
-        other = make_policy(load_config("any"), None, Sets, to_arrays(torch.load(weights)))
+        other = make_policy(load_config("generalist"), None, Sets, to_arrays(torch.load(weights)))
     planner = TEACHERS.get(family, Planner)()
     demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
     simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))
@@ -198,7 +198,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     options = parser.parse_args()
-    config, weights, paths = load_config("any"), None, []
+    config, weights, paths = load_config("generalist"), None, []
     first = 0
     for number, kind in enumerate(ROUNDS, 1):
         folder = options.out.with_name(f"{options.out.name}-examples") / str(number)

@@ -1,4 +1,4 @@
-"""Compare ``any`` in integers with its float network, on missions that neither has seen.
+"""Compare ``generalist`` in integers with its float network, on missions that neither has seen.
 
 python benchmarks/integers.py test-seas --missions 3
 python benchmarks/integers.py jade-bight new-jersey paper --missions 300
@@ -63,7 +63,7 @@ def fleets_of(name: str) -> Iterator[tuple[str, ScenarioSpace]]:
 
 def compare(space: ScenarioSpace, missions: int) -> tuple[np.ndarray, np.ndarray]:
     """The differences of the product [points], and the UAVs lost by the float network and by it."""
-    acting = load_teacher(TRAINED / "any")[0], load_policy(TRAINED / "any")
+    acting = load_teacher(TRAINED / "generalist")[0], load_policy(TRAINED / "generalist")
     floats, integers = (simulate_batch(space, policy, SEED, missions) for policy in acting)
     lost = np.array([records.uavs["down"].sum() for records in (floats, integers)])
     return 100 * (integers.missions[PRODUCT] - floats.missions[PRODUCT]), lost

@@ -64,6 +64,9 @@ GROUP = "dess.policies"
 
 CLASSES = HEURISTICS | PLANNERS  # the shipped policies that are classes
 
+# Former names of policies, which version 0.3 still takes.
+FORMER = {"any": "generalist"}
+
 TRAINED = Path(__file__).with_name("trained")  # one folder per trained policy
 
 FORM = "FILE.py:CLASS"
@@ -110,7 +113,7 @@ def load(name: str | Path, *, run_files: bool = False) -> Policy:
         InputError: If the policy does not exist, cannot be loaded, or is a class of a Python file
             that may not be run.
     """
-    name = str(name)
+    name = current_name(str(name))
     if name in CLASSES:
         shipped = CLASSES[name]
         return _make_policy(name, shipped.module, lambda: _find_class(shipped.module, shipped.kind))
@@ -132,8 +135,14 @@ def load(name: str | Path, *, run_files: bool = False) -> Policy:
     raise unknown_name("policy", f"{shown(name)} is unknown", name, names(), _OTHERS)
 
 
+def current_name(team: str) -> str:
+    """A policy or a team, by the present names of its policies."""
+    return ",".join(FORMER.get(name.strip(), name) for name in team.split(","))
+
+
 def folder_of(name: str) -> Path | None:
     """The folder of a trained policy, if the name is that of one."""
+    name = current_name(name)
     folder = TRAINED / name if name in trained_names() else Path(name)
     # An empty name would be the working folder.
     return folder if name and os.path.exists(folder / CONFIG) else None
@@ -301,6 +310,7 @@ def describe_policy(name: str, *, run_files: bool = False) -> About:
     Raises:
         InputError: If it does not exist or cannot be loaded.
     """
+    name = current_name(name)
     policy = load(name, run_files=run_files)
     folder = folder_of(name)
     described = read_description(folder) if folder else None

@@ -105,7 +105,7 @@ PLANNERS = {
     ),
 }
 TRAINED = {
-    "any": Shipped(seconds=1e-5),
+    "generalist": Shipped(seconds=1e-5),
     "ddqn": Shipped(seconds=6e-6, look=4),
     "ddqn-2": Shipped(seconds=6e-6),
     "ddqn-3": Shipped(seconds=6e-6),

@@ -40,7 +40,8 @@ ROOMS = {
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
-        *("shipped", "network", "integers", "quantization", "adapter", "heuristics", "planner"),
+        *("shipped", "network", "integers", "quantization", "adapter", "choices", "flight"),
+        *("heuristics", "planner"),
         *("learner.config", "learner.policy", "learner.arrays", "learner.trained"),
         "learner.network",
         *("learner.calibration", "learner.training"),
@@ -297,7 +298,9 @@ def test_the_command_line_loads_nothing_heavy():
 @pytest.mark.brief
 def test_torch_is_loaded_only_for_trainings():
     script = "import dess.policies, dess.analysis; from dess.reports.cli import main\n"
-    script += "dess.policies.load_team('greedy,any,ddqn,ddqn-paper'), dess.policies.names()\n"
+    script += (
+        "dess.policies.load_team('greedy,generalist,ddqn,ddqn-paper'), dess.policies.names()\n"
+    )
     script += "for line in ('policies', 'evaluate --policy ddqn --missions 1'):\n"
     script += "    assert main(line.split()) == 0\n"
     assert not LEARNING & loaded_by(script + "assert main(['train', 'none', '--out', 'none']) == 2")

@@ -60,7 +60,7 @@ ANSWERED = (
     *("policies", "scenarios", "scenarios show jade-bight", "studies"),
     "simulate --scenario small.toml --events log.parquet",
     "evaluate --scenario small.toml --policy tour --missions 3",
-    *("simulate --policy ddqn", "evaluate --policy any --policy ddqn-paper --missions 2"),
+    *("simulate --policy ddqn", "evaluate --policy generalist --policy ddqn-paper --missions 2"),
     *("study run trial.toml --out trial", "study show trial"),
     "sweep --scenario small.toml --set uavs=1,2 --missions 3",
     "verify trial --missions 2",
@@ -131,9 +131,10 @@ def test_packages_are_imported_without_any_extra(folder):
         "import dess, policies, analysis\n"
         "for package in (dess, policies, analysis):\n"
         "    for name in package.__all__: getattr(package, name)\n"
-        "print(*(policy.name for policy in dess.policies.load_team('any,ddqn,ddqn-paper')))\n"
+        "team = dess.policies.load_team('generalist,ddqn,ddqn-paper')\n"
+        "print(*(policy.name for policy in team))\n"
     )
-    assert python(folder, script, json.dumps(sorted(absent()))) == "any ddqn ddqn-paper\n"
+    assert python(folder, script, json.dumps(sorted(absent()))) == "generalist ddqn ddqn-paper\n"
 
 
 def test_the_packages_of_an_extra_are_those_of_its_libraries():

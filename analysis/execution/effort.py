@@ -23,11 +23,11 @@ from dess.policies.shipped import SHIPPED
 from dess.scenario.scenario import ScenarioSpace
 
 # The policies from the slowest to the fastest: the time of a decision [s] as measured on one core.
-SECONDS = {n: SHIPPED[n].seconds for n in ("planner", "planner-short", "any", "greedy")}
+SECONDS = {n: SHIPPED[n].seconds for n in ("planner", "planner-short", "generalist", "greedy")}
 BASELINE = "greedy"  # the policy without learning and search that the best one is compared with
 # From the best to the worst. A search of the same length is worse for a larger fleet.
-OF_SMALL_FLEETS = ("planner", "planner-short", "any", BASELINE)
-OF_LARGE_FLEETS = ("planner", "any", "planner-short", BASELINE)
+OF_SMALL_FLEETS = ("planner", "planner-short", "generalist", BASELINE)
+OF_LARGE_FLEETS = ("planner", "generalist", "planner-short", BASELINE)
 SMALL = 2.0  # UAVs on average
 
 BUDGET = 300.0  # [s]

@@ -51,7 +51,7 @@ _F8, _I8, _I4 = np.float64, np.int64, np.int32
 _MISSION, _UAV, _SEQUENCE = MISSION, UAV, SEQUENCE
 _NO_UAV = np.zeros(1, UAV_RECORD)  # the record of one that a mission does not have
 # The trained policy that the module has, and the numbers of all policies.
-NETWORK = "any"
+NETWORK = "generalist"
 POLICIES = KINDS | {NETWORK: _NETWORK}
 # The metrics of missions, in the order of the columns of ``values``: those of each mission, what
 # extended scenarios measure (nan where one does not), and the cost (nan without prices).

@@ -40,7 +40,12 @@ def sweep(
         typer.Option("--set", metavar="KEY=VALUES", autocompletion=options.complete_fields),
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=options.complete_policies)
+        list[str] | None,
+        typer.Option(
+            metavar="P,P,...",
+            autocompletion=options.complete_policies,
+            callback=options.use_current_names,
+        ),
     ] = None,
     metric: str | None = None,
     missions: Annotated[int, typer.Option(min=1)] = 300,
@@ -127,7 +132,12 @@ def what_if(
         list[str] | None, typer.Option(metavar="KEY=VALUE", autocompletion=options.complete_fields)
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
+        list[str] | None,
+        typer.Option(
+            metavar="P[,P...]",
+            autocompletion=options.complete_policies,
+            callback=options.use_current_names,
+        ),
     ] = None,
     missions: Annotated[int, typer.Option(min=2)] = 500,
     years: options.YearsOption = None,

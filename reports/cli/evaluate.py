@@ -26,7 +26,12 @@ _DIFFERENCE = ["difference", "low", "high", "p", "p_adjusted", "n"]
 def evaluate(
     context: typer.Context,
     policy: Annotated[
-        list[str], typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
+        list[str],
+        typer.Option(
+            metavar="P[,P...]",
+            autocompletion=options.complete_policies,
+            callback=options.use_current_names,
+        ),
     ],
     scenario: options.ScenarioOption = "paper",
     settings: options.SetOption = None,

@@ -46,6 +46,7 @@ def show_policy(
     """
     from dess.policies.registry import describe_policy
 
+    (name,) = options.use_current_names([name]) or []
     about = describe_policy(name, run_files=True)
     if as_json:
         print(json.dumps(about._asdict(), indent=2))

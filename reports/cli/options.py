@@ -28,6 +28,17 @@ def complete_policies(start: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in _names_beginning_with(names(), last)]
 
 
+def use_current_names(teams: list[str] | None) -> list[str] | None:
+    """Teams by the present names of their policies; of a former name, one line tells it."""
+    from dess.policies.registry import current_name
+
+    current = [current_name(team) for team in teams or []]
+    for team, name in zip(teams or [], current, strict=True):
+        if team != name:
+            print_text(f"dess: the policy {team} is now {name}", sys.stderr)
+    return current or teams
+
+
 def complete_scenarios(start: str) -> list[str]:
     """Names of shipped scenarios, and of families of generated ones up to the seed."""
     from dess.scenario.scenario import scenario_families, scenario_names

@@ -206,7 +206,7 @@ def _read_scenario(
     from dess.policies.registry import load_team
 
     space = options.load_space(scenario, settings)
-    policy = policy or "greedy"
+    (policy,) = options.use_current_names([policy or "greedy"]) or []
     team = load_team(policy, run_files=True)
     return _Asked(space, policy, team, seed, replication or 0, processes, scenario)
 

@@ -51,7 +51,12 @@ def run(
     missions: Annotated[int | None, typer.Option(min=1)] = None,
     years: options.YearsOption = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=options.complete_policies)
+        list[str] | None,
+        typer.Option(
+            metavar="P[,P...]",
+            autocompletion=options.complete_policies,
+            callback=options.use_current_names,
+        ),
     ] = None,
     process: options.ProcessOption = None,
     dry_run: Annotated[bool, typer.Option("--dry-run")] = False,

@@ -18,7 +18,7 @@
 results = "../../results"  # folder in which the sweep is kept
 scenario = "bay"  # the sea: a TOML file, or this shipped example
 fields = {"uavs": [1, 2, 3], "pads": [1, 2], "arrival_rate": [0.01, 0.03], "landing": True}
-policies = ["any", "greedy"]  # None: the best that five minutes allow, and greedy
+policies = ["generalist", "greedy"]  # None: the best that five minutes allow, and greedy
 prices = {"uav": 20_000, "pad": 10_000, "charge": 2, "hour": 100, "slot_seconds": 60}
 currency, planned = "EUR", 200  # currency of the prices; number of missions planned for the fleet
 requirements = {"success": 0.99, "collection_ratio": 0.6}  # the lowest acceptable means

@@ -28,7 +28,7 @@ COMMANDS = {
     "study show": ["study", "show", "trial"],
     "study diff": ["study", "diff", "trial", "again"],
     "verify": ["verify", "trial", "--missions", "2", "--seed", "1"],
-    "policies show": ["policies", "show", "any"],
+    "policies show": ["policies", "show", "generalist"],
     "scenarios show": ["scenarios", "show", "paper"],
     "studies show": ["studies", "show", "pads"],
 }

@@ -20,7 +20,7 @@ EXTENDED: dict[str, Any] = {
     "age": {"measured": True, "reward": 0.5},
 }
 SEAS: dict[str, dict[str, Any]] = {"paper": {}, "archipelago:7": {}, "bay": EXTENDED}
-TEAMS = ["greedy", "age", "planner-short", "ddqn", "any"]
+TEAMS = ["greedy", "age", "planner-short", "ddqn", "generalist"]
 
 
 def bytes_of(table: np.ndarray) -> bytes:

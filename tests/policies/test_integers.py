@@ -113,7 +113,7 @@ def test_features_choose_the_form():
 
 
 def test_missions_are_the_same_in_any_batch_in_threads_and_in_both_engines():
-    policy = load_policy(TRAINED / "any")
+    policy = load_policy(TRAINED / "generalist")
     for name in ("paper", "jade-bight"):
         space = load_scenario(name)
         assert_same_alone(space, policy, 63, range(2), batch_size=2)
@@ -149,7 +149,7 @@ class _Watch:
 
 def test_next_to_no_activation_is_clipped_in_missions_of_sheets():
     """Neither for a lone UAV, nor on a sheet that no calibration has seen."""
-    watch = _Watch(load_policy(TRAINED / "any"))
+    watch = _Watch(load_policy(TRAINED / "generalist"))
     for uavs in (1, 3):
         simulate_batch(load_scenario("jade-bight", uavs=uavs), watch, 20261214, 2)
     simulate_batch(drawn_sheet(DRAWN + 1), watch, 20261214, 2)

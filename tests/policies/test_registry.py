@@ -223,7 +223,7 @@ def test_snrs_are_compared_at_the_same_distance():
         (1000.0, -25.0, True),  # that of the paper, but 18 km away
     ):
         space = ScenarioSpace.of(edge_snr=snr, radio={"anchor": anchor})
-        lines = registry.list_departures(["any", "ddqn"], [space])
+        lines = registry.list_departures(["generalist", "ddqn"], [space])
         assert bool(lines) is is_told
         assert all(": SNR at 1 km" in line for line in lines)
     [line] = registry.list_departures(["ddqn"], [space])
@@ -232,6 +232,15 @@ def test_snrs_are_compared_at_the_same_distance():
 
 def test_a_rate_in_steps_is_outside_of_every_training():
     plain, steps = (ScenarioSpace.of(radio={"steps": s}) for s in ([], [[-7.5, 0.04], [0, 0.4]]))
-    assert not any("steps" in line for line in registry.list_departures(["any"], [plain]))
-    [line] = registry.list_departures(["any", "greedy"], [plain, steps])
-    assert line.startswith("any acts outside") and "a rate in steps (trained on eq. 9)" in line
+    assert not any("steps" in line for line in registry.list_departures(["generalist"], [plain]))
+    [line] = registry.list_departures(["generalist", "greedy"], [plain, steps])
+    assert (
+        line.startswith("generalist acts outside") and "a rate in steps (trained on eq. 9)" in line
+    )
+
+
+def test_a_former_name_is_taken():
+    assert registry.load("any").name == "generalist"
+    assert [policy.name for policy in registry.load_team("greedy, any")] == ["greedy", "generalist"]
+    assert registry.describe_policy("any").name == "generalist"
+    assert "any" not in registry.names()

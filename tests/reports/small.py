@@ -47,10 +47,10 @@ STUDIES: dict[str, dict[str, Any]] = {
     },
     "planning": {"policies": [*POLICIES, "planner"], "missions": 40, "logged": 2},
     "gap": {"policies": [*POLICIES, "planner"], "missions": 12},
-    "seas": {"policies": ["any", "greedy", "planner"], "missions": 4, "design": _SEAS},
-    "seas-landing": {"policies": ["any", "greedy"], "missions": 4, "design": _SEAS},
+    "seas": {"policies": ["generalist", "greedy", "planner"], "missions": 4, "design": _SEAS},
+    "seas-landing": {"policies": ["generalist", "greedy"], "missions": 4, "design": _SEAS},
     "seas-horizon": {
-        "policies": ["any", "greedy"],
+        "policies": ["generalist", "greedy"],
         "missions": 4,
         "set": {"landing": True, "quota": 0, "max_slots": 60},
         "design": _SEAS,

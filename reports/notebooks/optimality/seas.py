@@ -15,7 +15,7 @@
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders seas, seas-landing, seas-horizon
-policy = "any"  # the learned policy for any sea
+policy = "generalist"  # the learned policy for any sea
 reference = None  # a slow policy that is hard to beat; None for a planner of the study
 heuristic = "greedy"  # a fast policy without learning
 

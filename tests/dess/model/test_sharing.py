@@ -153,7 +153,7 @@ def test_missions_together_are_those_of_empty_caches():
     spaces = _spaces()
     effects = set()
     leaving = Script(*5 * ["N" * 9])  # until its battery is empty
-    teams = [*map(policies.load, ("greedy", "any")), HastyPlanner(), Fidget(), leaving]
+    teams = [*map(policies.load, ("greedy", "generalist")), HastyPlanner(), Fidget(), leaving]
     for policy in teams:
         together = simulate_batch(spaces, policy, 3, [1] * len(spaces))
         different = {}

@@ -130,7 +130,7 @@ LAYERS = SetNetwork.layer_sizes(Sets.shapes, [16, 8, 16])
 def _any(seed: int = 1) -> LearnedPolicy:
     """A policy of random weights that decides on any sea."""
     network = FloatNetwork(SetNetwork, _weights(LAYERS, seed))
-    return LearnedPolicy("any", Sets, network, True, None)
+    return LearnedPolicy("generalist", Sets, network, True, None)
 
 
 @settings(max_examples=8)

@@ -180,9 +180,9 @@ def test_a_policy_that_is_replaced_while_it_is_read_is_read_again(training, fold
 
 
 def test_integers_that_are_damaged_or_of_other_weights_are_not_used(tmp_path, caplog):
-    folder = tmp_path / "any"
-    shutil.copytree(TRAINED / "any", folder)
-    assert load_policy(folder).weights == load_policy(TRAINED / "any").weights
+    folder = tmp_path / "generalist"
+    shutil.copytree(TRAINED / "generalist", folder)
+    assert load_policy(folder).weights == load_policy(TRAINED / "generalist").weights
     path = folder / INTEGERS
     content = path.read_bytes()
     in_floats = load_teacher(folder)[0].weights

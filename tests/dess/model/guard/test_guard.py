@@ -310,11 +310,11 @@ SHARED |= {"wind": {"strength": 0.2, "direction": 268, "gusts": 0.1, "seed": 79}
     ("sea", "changes", "policy", "replication"),
     [
         # The sea is empty: the arrivals that are left fill the quota too late.
-        ("clustered:900307", {"uavs": [3, 5], "pads": 3}, "any", 2),
+        ("clustered:900307", {"uavs": [3, 5], "pads": 3}, "generalist", 2),
         # A third UAV would wait for longer than its battery lasts; another zone is in reach.
-        ("corridor:900002", {"uavs": [5, 6], "pads": 4}, "any", 9),
+        ("corridor:900002", {"uavs": [5, 6], "pads": 4}, "generalist", 9),
         # The own cell is behind others of the zone, in wind.
-        ("clustered:900701", WIND, "any", 3),
+        ("clustered:900701", WIND, "generalist", 3),
         # The zone that is nearest by cells is not the one that is nearest by battery.
         ("coast:900701", WIND, "greedy", 2),
         # Four UAVs insist on cells beside each other.
@@ -324,7 +324,7 @@ SHARED |= {"wind": {"strength": 0.2, "direction": 268, "gusts": 0.1, "seed": 79}
         # Three UAVs come to a zone of six cells at once, and two of them close its side.
         ("clustered:910027", {"uavs": 3, "pads": 2}, "greedy", 6),
         # One of two UAVs takes the pad of the only zone that the other reaches.
-        ("large:700014", {"uavs": 2, "pads": 1}, "any", 1),
+        ("large:700014", {"uavs": 2, "pads": 1}, "generalist", 1),
         # Two UAVs come to a pad in the same slot, and the one with less battery cannot wait.
         ("large:1230002", {"uavs": 2, "pads": 1}, "greedy", 0),
         # Six UAVs collect the last data faster than they did on the whole.
