@@ -13,6 +13,7 @@ import numpy as np
 from dess.base.kernels import inlined, kernel
 from dess.model.guard.battery import late_slots, margin, margin_slots, slots_needed, usable_battery
 from dess.model.guard.moves import contest, contests, guide_uav
+from dess.model.guard.parking import stays
 from dess.model.guard.ways import (
     is_beyond_battery,
     path_length,
@@ -76,10 +77,10 @@ def choose_action(
 ):
     """The action of UAV ``i``; ``left`` are all data, ``memory`` is that of its parking cell."""
     if kind == UNGUARDED:
-        legal = legal_moves(chart.zones, team[i])
-        return _choose_at_random(mission, team, i, legal, chart.sizes)
-    charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
-    if kind == RANDOM:
+        charge, home, safe = False, stays(team[i]), legal_moves(chart.zones, team[i])
+    else:
+        charge, home, safe = guide_uav(mission, team, i, left, chart, memory, reach, False)
+    if kind in (RANDOM, UNGUARDED):
         return _choose_at_random(mission, team, i, safe, chart.sizes)
     goal_x, goal_y = _choose_goal(
         kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home, reach
