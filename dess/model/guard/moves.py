@@ -518,7 +518,7 @@ def guide_uav(mission, uavs, i, data, chart, memory, reach, find_home):
     home = stays(uavs[i])
     if charge or find_home:
         home = parking_cell(mission, uavs, i, data, chart, memory, reach)
-    elif is_tight(mission, chart.sizes):
+    if not charge and is_tight(mission, chart.sizes):  # its moves do not depend on ``find_home``
         forget_plan(mission, memory.plan)
     return charge, home, safe_moves(mission, uavs, i, chart, charge, home, memory, reach)
 
