@@ -295,15 +295,19 @@ def compile_notice() -> Iterator[None]:
 
 @cache
 def announce_compiling() -> None:
-    """Print that the simulator is compiled, the first time that this is called."""
+    """Print that the simulator is compiled, the first time that this is called.
+
+    It has a line of its own beside a progress bar.
+    """
     from numba.core.caching import NullCache
+    from tqdm import tqdm
 
     from dess.model.rules import launch  # any kernel
 
     when = "first run only"
     if isinstance(launch._cache, NullCache):  # no folder beside the code can be written
         when = "in every run; NUMBA_CACHE_DIR=DIR keeps it"
-    print(f"compiling the simulator ({when}) ...", file=sys.stderr)
+    tqdm.write(f"compiling the simulator ({when}) ...", file=sys.stderr)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Output of the command line: what reaches the terminal, and streams that take nothing."""
 
 import logging
+import re
 import subprocess
 import sys
 
@@ -114,3 +115,16 @@ def test_what_no_command_expects_of_its_input_is_a_line(monkeypatch, capsys, err
     monkeypatch.setattr("dess.scenario.scenario.scenario_names", fail)
     assert cli.main(["scenarios"]) == 1
     assert line in capsys.readouterr().err
+
+
+def test_a_notice_has_a_line_of_its_own_beside_a_progress_bar(capfd):
+    console.announce_compiling.cache_clear()
+    with console.progress_bar("mission", 10) as progress:
+        progress.delay = progress.mininterval = 0
+        progress.start_t -= 60
+        progress.update(3)
+        progress.refresh()
+        console.announce_compiling()
+    lines = re.split(r"[\n\r]+", capfd.readouterr().err)
+    assert any("3/10" in line for line in lines)
+    assert any(re.fullmatch(r"compiling the simulator \(.*\) \.\.\.", line) for line in lines)
