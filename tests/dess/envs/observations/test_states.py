@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 
 import dess
 from dess.envs.observations import states as column
@@ -14,6 +14,8 @@ from dess.model.guard import guard
 from dess.model.mission import simulate
 from dess.model.state import HOVER
 from dess.model.view import View
+from dess.policies import load
+from dess.scenario.scenario import ScenarioSpace
 from tests.dess.envs.episodes import placed
 from tests.drawn import PLAIN_SEA, replications, seeds, spaces, teams
 
@@ -51,6 +53,17 @@ class _Compared:
 SLOW = spaces(fleet=[{"slots_per_cell": 3}, {}], **PLAIN_SEA)  # with islands, compiled once more
 
 
+# A zone that all UAVs together fill.
+TIGHT = ScenarioSpace.of(
+    **{"grid": 4, "zone": [0, 0, 2, 2], "nodes": [[0, 0], [0, 1]], "pads": 1, "uavs": 4},
+    **{"flying_time": 8, "charge_start": 10, "charge_complete": 11, "charge_rate": 1},
+    **{"quota": 5, "communication_slots": 1, "max_slots": 20, "arrival_rate": 0, "edge_snr": 0},
+    **{"initial_data": [0, 24], "path_loss_exponent": 2, "shadowing_variance": 0},
+    **{"cell_size": 1, "altitude": 1, "fleet": [{"slots_per_cell": 3}, {}]},
+)
+
+
+@example(TIGHT, [load("random")], 0, 0)
 @given(spaces() | SLOW, teams, seeds, replications)
 def test_compact_states_tell_what_the_view_tells(space, team, seed, replication):
     simulate(space, [*map(_Compared, team[: space.uavs[1]])], seed, replication)
