@@ -1,7 +1,7 @@
 """The training of ``generalist`` by imitation: planned missions on generated seas as examples.
 
     python -m benchmarks.demonstrations --out runs/imitation
-    dess train any --from runs/imitation --out runs/any
+    dess train generalist --from runs/imitation --out runs/generalist
 
 A planner flies missions on the seas of the set ``train``, and another policy makes a share of the
 decisions, so that the planner also shows how to go on from there. In the first round that policy
