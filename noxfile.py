@@ -1,4 +1,8 @@
-"""The sessions: tests, lowest, lint, docs, wasm, reports, bench, verify, fuzz, integrations."""
+"""The sessions.
+
+tests, lowest, lint, docs, wasm, reports, bench, verify, fuzz, integrations, and release: the checks
+of a release, which ``.ci/run`` leaves out.
+"""
 
 import re
 import shutil
@@ -193,6 +197,22 @@ def bench(session: nox.Session) -> None:
     """Measure the speed of the engines."""
     install(session, "[test]")
     session.run("pytest", "benchmarks", *session.posargs)
+
+
+@nox.session
+def release(session: nox.Session) -> None:
+    """Check that a release is whole and can be installed; ``-- --check``. It uploads nothing.
+
+    It installs wheel, sdist and zip with the oldest and the newest Python, one after the other, and
+    takes up to half an hour and 2 GB; ``docs/maintaining.md`` has the other steps.
+    """
+    if not session.posargs:
+        session.error("release: an argument is missing; allowed: --check")
+    if session.posargs != ["--check"]:
+        session.error(f"release: {' '.join(session.posargs)} is unknown; allowed: --check")
+    if session.virtualenv.venv_backend != "none":
+        session.install("hatchling", "pytest", "pyyaml", "-c", "constraints.txt")
+    session.run("python", "-m", "tests.release")
 
 
 @nox.session(python=False)

@@ -26,15 +26,21 @@ def built(kind: str, folder: Path, source: Path = ROOT) -> Path:
     return file
 
 
-def unpacked(folder: Path, source: Path = ROOT) -> Path:
-    """A source tree as an unpacked archive of git has it, where links have become text files."""
+def archived(folder: Path, source: Path = ROOT) -> Path:
+    """A source tree as a zip of git."""
     git = ["git", "--git-dir", str(folder / "git"), "--work-tree", str(source)]
-    archive, tree = folder / "dess.zip", folder / "dess-main"
+    archive = folder / "dess.zip"
     subprocess.run([*git, "init", "--quiet"], check=True)
     subprocess.run([*git, "add", "--all"], check=True, cwd=source)
     files = subprocess.check_output([*git, "write-tree"], text=True).strip()
     subprocess.run([*git, "archive", "--format=zip", "-o", str(archive), files], check=True)
-    with ZipFile(archive) as zipped:
+    return archive
+
+
+def unpacked(folder: Path, source: Path = ROOT) -> Path:
+    """A source tree as an unpacked archive of git has it, where links have become text files."""
+    tree = folder / "dess-main"
+    with ZipFile(archived(folder, source)) as zipped:
         zipped.extractall(tree)
     return tree
 

@@ -15,12 +15,11 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+from tests import release
 from tests.distributions import EXTRAS, PROJECT, ROOT, asked, closure, homes, requirements
 from tests.installed import built, environment, unpacked
 
 CONSTRAINTS = ROOT / "constraints.txt"
-# The folders of the product, and what is before their names where they are installed.
-FOLDERS = {"dess": "", "policies": "dess/", "analysis": "dess/", "reports": "dess/"}
 ASKED = asked("test", "lint", "docs", "examples")
 APART = {"test", "lint", "docs", "examples"}  # extras that ``all`` does not include
 
@@ -44,16 +43,22 @@ def wheel(tmp_path_factory):
 
 
 def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(wheel):
-    files = {
-        f"{FOLDERS[folder]}{path.relative_to(ROOT).as_posix()}"
-        for folder in FOLDERS
-        for path in (ROOT / folder).rglob("*")
-        if path.is_file() and not {"__pycache__", ".ipynb_checkpoints"} & set(path.parts)
-    }
-    held = {name for name in wheel.namelist() if not name.split("/")[0].endswith(".dist-info")}
-    assert held == files
-    assert {name.split("/")[0] for name in held} == {"dess"}
-    assert "dess/py.typed" in held
+    held = set(wheel.namelist())
+    assert release.faults_of_wheel(held, ROOT) == []
+    folders = {name.split("/")[0] for name in held}
+    assert {folder for folder in folders if not folder.endswith(".dist-info")} == {"dess"}
+
+
+def test_files_that_a_release_lacks_and_caches_in_it_are_named():
+    held = {*release.product_files(ROOT), *(path.name for path in ROOT.glob("LICENSE*"))}
+    assert release.faults_of_sdist(held, ROOT) == []
+    engine = next(name for name in held if name.endswith("engine.wasm"))
+    faults = release.faults_of_sdist({*held, "tests/__pycache__/a.pyc"} - {engine}, ROOT)
+    assert faults == [
+        f"sdist: {engine} is missing",
+        "sdist: engine.wasm is missing",
+        "sdist: tests/__pycache__/a.pyc is not of the release",
+    ]
 
 
 def test_the_wheel_has_the_notice_of_the_coefficients_that_it_uses(wheel):
@@ -127,7 +132,7 @@ def test_a_copy_of_dess_alone_is_not_built(tmp_path):
 def test_every_library_that_is_imported_is_asked_for():
     imported = {
         (node.module if isinstance(node, ast.ImportFrom) else alias.name).split(".")[0]
-        for folder in FOLDERS
+        for folder in release.FOLDERS
         for path in (ROOT / folder).rglob("*.py")
         if path.parent.name != "integrations"  # the libraries of these modules are the user's
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
@@ -168,19 +173,44 @@ def test_all_and_the_tests_have_every_extra_that_adds_something():
     assert everything <= set(asked("test"))
 
 
-def test_citation_and_changelog_have_this_version():
+def test_the_project_is_one_version_of_one_date_and_licence():
+    assert release.disagreements(ROOT) == []
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
-    assert [citation[key] for key in ("version", "license")] == [PROJECT["version"], "MIT"]
     assert "Multi-UAV Trajectory Optimizer" in citation["references"][0]["title"]
-    entries = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
-    assert entries[:2] == ["Unreleased", PROJECT["version"]]
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "other", "found"),
+    [
+        ("pyproject.toml", r"^version = .*", 'version = "9.9"', "version: 9.9 and"),
+        ("CITATION.cff", r"^version: .*", "version: 9.9.9", "version: "),
+        (
+            "CITATION.cff",
+            r"^date-released: .*",
+            "date-released: 2020-02-02",
+            "date: 2020-02-02 and",
+        ),
+        ("CITATION.cff", r"^license: .*", "license: ISC", "licence: MIT and ISC;"),
+        ("CHANGELOG.md", r"^## \[\d", "## [9", "version: "),
+        ("LICENSE", r"\A.*", "ISC License", "licence: MIT and ISC;"),
+    ],
+)
+def test_a_version_date_or_licence_that_differs_is_found(tmp_path, name, line, other, found):
+    for file in ("pyproject.toml", "CITATION.cff", "CHANGELOG.md", "LICENSE"):
+        shutil.copy(ROOT / file, tmp_path)
+    text, count = re.subn(line, other, (tmp_path / name).read_text("utf-8"), count=1, flags=re.M)
+    assert count == 1
+    (tmp_path / name).write_text(text, "utf-8")
+    [disagreement] = release.disagreements(tmp_path)
+    assert disagreement.startswith(found)
 
 
 def test_ci_runs_every_nox_session():
     defined = re.findall(r"^@nox\.session.*\ndef (\w+)", (ROOT / "noxfile.py").read_text(), re.M)
     lines = re.findall(r"^\S*nox .*-s ([\w ]+?)(?: --|$)", (ROOT / ".ci/run").read_text(), re.M)
     assert {"tests", "verify", "fuzz"} <= set(defined)
-    assert sorted(" ".join(lines).split()) == sorted(defined)
+    apart = {"release"}  # half an hour, for who releases
+    assert sorted(" ".join(lines).split()) == sorted({*defined} - apart)
 
 
 def test_the_hooks_before_a_commit_are_what_lint_runs():
