@@ -33,6 +33,7 @@ OPENING_OF = {
 ALLOWED = {
     # A results folder, whose files the door reads and writes.
     "dess.analysis.execution.runner": {"open"},
+    "dess.analysis.results.merge": {"open"},
     # Sources of our own code, and what numba keeps of it.
     "dess.base.kernels": {"read_bytes"},
     "dess.base.sources": {"read_bytes"},

@@ -24,12 +24,13 @@ from dess import InputError
 from dess.analysis.execution.effort import BASELINE as ANY_POLICY
 from dess.analysis.execution.effort import Planned, check_run, plan_study, policies_for
 from dess.analysis.execution.jobs import Progress
-from dess.analysis.execution.runner import Round, run_study
+from dess.analysis.execution.runner import Round, run_shard, run_study
 from dess.analysis.measured import refuse_neutral
 from dess.analysis.metrics import AGE, ALIASES, LATE, LEAST, METRICS, OLDEST, column_in_sheet_unit
 from dess.analysis.names import SWEEP, SWEEPS, field_in_words, value_of_field
 from dess.analysis.results.chunks import MANIFEST, short_hash
 from dess.analysis.results.provenance import engine_code, team_of
+from dess.analysis.results.shards import Shard
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import scenario_notes
 from dess.analysis.study.cheapest import Cheapest, Required
@@ -132,14 +133,33 @@ class Question:
             ChunkError: If a chunk could not be computed; all others are complete.
         """
         reuse = self.others
-        check_run(self.study, self.out, workers, reuse=reuse, yes=yes)
+        self._begin(workers, yes, reuse)
+        return run_study(self.study, self.out, workers, None, progress, announce, reuse=reuse)
+
+    def ask_shard(
+        self,
+        shard: Shard,
+        workers: int = 1,
+        progress: Progress | None = None,
+        announce: Callable[[Round], object] | None = None,
+        yes: bool = False,
+    ) -> None:
+        """Write the file of the study, and simulate a shard of it; nothing is copied.
+
+        Args and errors are those of ``ask`` and ``run_shard``.
+        """
+        self._begin(workers, yes, shards=shard.total)
+        run_shard(self.study, self.out, shard, workers, None, progress, announce)
+
+    def _begin(self, workers: int, yes: bool, reuse: Sequence[Path] = (), shards: int = 1) -> None:
+        """Check that the question can be asked, and write the file of the study."""
+        check_run(self.study, self.out, workers, reuse=reuse, yes=yes, shards=shards)
         data = self.study.model_dump(mode="json", exclude_unset=True)
         if not is_scenario_name(self.study.scenario):
             path = os.path.relpath(self.study.scenario, self.file.parent)
             data["scenario"] = Path(path).as_posix()
         if not (self.file.exists() and is_read_only(self.file.parent)):
             write_file(self.file, tomli_w.dumps(data))
-        return run_study(self.study, self.out, workers, None, progress, announce, reuse=reuse)
 
     @property
     def command(self) -> str:

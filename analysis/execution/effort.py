@@ -291,6 +291,7 @@ def check_run(
     accept_code: bool = False,
     reuse: Sequence[Path] = (),
     yes: bool = False,
+    shards: int = 1,
 ) -> None:
     """Refuse a run that could not come to its end, before its first mission.
 
@@ -301,6 +302,7 @@ def check_run(
         accept_code: Whether missions that other code has simulated count as present.
         reuse: Other results folders, whose missions are copied where they belong to the study.
         yes: Whether any time and memory is allowed.
+        shards: How many shards the study is divided into, of which this is one.
 
     Raises:
         InputError: If the run would take long or more memory than is available (the message has
@@ -310,7 +312,8 @@ def check_run(
     """
     plan = plan_study(study, out, workers, accept_code)
     teams = len(study.policies)
-    if reuse and total_time(plan, workers).low > LONG_RUN:
+    at_work = workers * shards
+    if reuse and total_time(plan, at_work).low > LONG_RUN:
         plan = plan_study(study, out, workers, accept_code, reuse)
     missing = sum(planned.missing for planned in plan[:teams])
     if any(planned.missing + planned.logs for planned in plan):
@@ -321,7 +324,7 @@ def check_run(
         f"{study.size:,}, workers: {workers:,})"
     )
     if not yes and any(planned.missing + planned.logs for planned in plan):
-        check_time(what, total_time(plan, workers))
+        check_time(what, total_time(plan, at_work))
         needed_memory = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
         check_workers_memory(
             what, workers, [study.scenarios[0], study.scenarios[-1]], needed_memory

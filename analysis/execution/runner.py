@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import count, groupby
 from pathlib import Path
 from typing import NamedTuple
 
+from dess import InputError
 from dess.analysis.execution.effort import check_workers
 from dess.analysis.execution.jobs import (
     CHUNK,
@@ -26,8 +27,9 @@ from dess.analysis.execution.jobs import (
 )
 from dess.analysis.execution.workers import Cluster, Here, Pool
 from dess.analysis.results import chunks, tables
-from dess.analysis.results.manifest import CellPart, Selected
+from dess.analysis.results.manifest import CellPart, Manifest, Selected
 from dess.analysis.results.replications import Present, gaps_between
+from dess.analysis.results.shards import Shard
 from dess.analysis.results.store import Failure, Store, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
@@ -107,22 +109,79 @@ def run_study(
     if not isinstance(study, Study):
         study = load_study(study)
     check_workers(workers)
-    pool: Pool = Cluster(scheduler) if scheduler else Here(workers)
-    with pool, Store.open(study, out, accept_code) as store:
+    with (
+        _pool(workers, scheduler) as pool,
+        Store.open(Manifest.of(study), out, accept_code) as store,
+    ):
         _Run(study, store, pool, progress, announce, reuse).complete()
         return results_of(store)
 
 
+def run_shard(
+    study: Study,
+    out: str | Path,
+    shard: Shard,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    announce: Callable[[Round], object] | None = None,
+    accept_code: bool = False,
+) -> None:
+    """Run a shard of a study into a results folder; ``merge_shards`` joins the shards.
+
+    Args:
+        study: The study, without a rule that decides the number of missions in rounds.
+        out: The results folder, in which other shards may run at the same time.
+        shard: Which chunks of the study are computed.
+        workers: As for ``run_study``, and so all that follow.
+        scheduler: Address of a scheduler.
+        progress: Called with what is done.
+        announce: Called before each kind of work.
+        accept_code: Whether to keep missions that other code has simulated.
+
+    Raises:
+        InputError: As ``run_study``, or if the study has such a rule.
+        ChunkError: As ``run_study``.
+        SchedulerError: As ``run_study``.
+    """
+    check_shardable(study)
+    check_workers(workers)
+    manifest = Manifest.of(study)
+    with (
+        _pool(workers, scheduler) as pool,
+        Store.open_shard(manifest, out, shard, accept_code) as store,
+    ):
+        _Run(study, store, pool, progress, announce, shard=shard).compute_shard()
+        if not store.manifest.complete:
+            shard.mark(store.folder, is_complete=True)
+
+
+def check_shardable(study: Study) -> None:
+    """Refuse to divide a study in which the missions of a round depend on those before.
+
+    Raises:
+        InputError: If a rule decides the number of its missions.
+    """
+    if study.rule:
+        problem = f"a rule decides round by round how many missions study {study.name} has"
+        raise InputError("--shard", problem, "--scheduler ADDRESS, or the study as a whole")
+
+
+def _pool(workers: int, scheduler: str | None) -> Pool:
+    return Cluster(scheduler) if scheduler else Here(workers)
+
+
 @dataclass
 class _Run:
-    """A run of a study into its folder, round by round."""
+    """A run of a study, or of a shard of it, into its folder, round by round."""
 
     study: Study
     store: Store
     pool: Pool
     progress: Progress | None
     announce: Callable[[Round], object] | None
-    reuse: Sequence[Path]
+    reuse: Sequence[Path] = ()
+    shard: Shard | None = None
     rounds: int = 0  # so far
     asked: int = 0  # missions, event logs and bounds needed in these rounds
 
@@ -137,12 +196,11 @@ class _Run:
         points = len(self.study.points)
         before = [[0] * points for _ in teams]
         counts = [[self.study.first] * points for _ in teams]
-        logs = [manifest.parts_of_team(team, [self.study.logged] * points) for team in teams]
+        logs = self._logs()
         asked: Present = defaultdict(list)
         while counts != before:
             of_teams = (manifest.parts_of_team(team, counts[team]) for team in teams)
-            parts = new_parts(of_teams, asked)
-            self._round(parts, new_parts(logs, defaultdict(list)))
+            self._round(new_parts(of_teams, asked), logs)
             before = counts
             logs = []
             counts = [self._more(team, counts[team]) for team in teams]
@@ -157,6 +215,25 @@ class _Run:
                 self.store.merge([*chunks.split_into_chunks(parts, CHUNK[self.study.engine])])
         self._make((BoundsJob, new_parts([manifest.parts_with_bounds(counts)], asked)))
         self.store.finish(counts, selected)
+
+    def compute_shard(self) -> None:
+        """Compute what is missing of a shard; the number of missions is fixed.
+
+        Raises:
+            ChunkError: If a chunk could not be computed, after the other chunks.
+        """
+        manifest = self.store.manifest
+        asked: Present = defaultdict(list)
+        of_teams = map(manifest.parts_of_team, range(len(self.study.policies)))
+        self._round(new_parts(of_teams, asked), self._logs())
+        self._make((BoundsJob, new_parts([manifest.parts_with_bounds()], asked)))
+
+    def _logs(self) -> list[CellPart]:
+        """The missions whose event logs the study keeps."""
+        manifest = self.store.manifest
+        counts = [self.study.logged] * len(manifest.points)
+        teams = range(len(self.study.policies))
+        return new_parts((manifest.parts_of_team(t, counts) for t in teams), defaultdict(list))
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
         """How many missions the rule needs at each point of a team, given those present."""
@@ -195,43 +272,57 @@ class _Run:
             ChunkError: If some could not be computed, after all others.
         """
         failures: dict[Path, Failure] = {}
-        needs = [(kind, sum(map(len, parts)), [*self._jobs(kind, parts)]) for kind, parts in works]
-        if any(jobs for _, _, jobs in needs):
+        needs = [(kind, [*self._chunks(kind, parts)]) for kind, parts in works]
+        jobs_of = {kind: [*self._jobs(kind, of_kind)] for kind, of_kind in needs}
+        missing = [job.chunk for jobs in jobs_of.values() for job in jobs]
+        if missing:
             check_folder(self.store.folder)
-        self.store.check_files(job.chunk for _, _, jobs in needs for job in jobs)
-        for kind, needed, jobs in needs:
-            if needed:
-                self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
-                failures |= self._do(jobs)
+        self.store.check_files(missing)
+        for kind, of_kind in needs:
+            if of_kind:
+                needed = sum(chunk.missions for chunk in of_kind)
+                present = needed - sum(job.missions for job in jobs_of[kind])
+                self._begin(needed, present, kind.work)
+                failures |= self._do(jobs_of[kind])
         if failures:
             raise ChunkError(failures)
 
-    def _jobs(self, kind: type[Job], parts: Sequence[CellPart]) -> Iterator[Job]:
-        """The jobs for what is missing of some parts, cut as if nothing were present."""
-        study = self.study
+    def _chunks(self, kind: type[Job], parts: Sequence[CellPart]) -> Iterator[chunks.Chunk]:
+        """The chunks of some parts, of a shard its own, cut as if nothing were present."""
+        numbers = count()
         for team, of_team in groupby(parts, lambda part: part.cell.team):
-            if kind is BoundsJob:
-                policy = "the upper bound"
-            else:
-                policy = study.policies[team]
-            for chunk in chunks.split_into_chunks(of_team, self._size(kind, policy)):
-                if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
-                    spaces = tuple(study.scenarios[part.cell.point] for part in missing)
-                    kept = chunks.Chunk(team, missing)
-                    typed = (study.run_files, study.processes)
-                    yield kind(kept, spaces, policy, study.seed, study.engine, *typed)
+            for chunk in chunks.split_into_chunks(of_team, self._size(kind, team)):
+                if self.shard is None or self.shard.has(next(numbers)):
+                    yield chunk
 
-    def _size(self, kind: type[Job], policy: str) -> int:
+    def _jobs(self, kind: type[Job], wanted: Sequence[chunks.Chunk]) -> Iterator[Job]:
+        """The jobs for what is missing of some chunks."""
+        study = self.study
+        for chunk in wanted:
+            if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
+                spaces = tuple(study.scenarios[part.cell.point] for part in missing)
+                kept = chunks.Chunk(chunk.team, missing)
+                typed = (study.run_files, study.processes)
+                policy = self._policy(kind, chunk.team)
+                yield kind(kept, spaces, policy, study.seed, study.engine, *typed)
+
+    def _policy(self, kind: type[Job], team: int) -> str:
+        """What makes the work of a team."""
+        if kind is BoundsJob:
+            return "the upper bound"
+        return self.study.policies[team]
+
+    def _size(self, kind: type[Job], team: int) -> int:
         """The number of missions of a chunk."""
         if kind is not MissionsJob:
             return BOUNDS_CHUNK if kind is BoundsJob else 1
-        team = load_team(policy, run_files=self.study.run_files)
-        chunks_of_members = (member.chunk for member in team if hasattr(member, "chunk"))
+        members = load_team(self.study.policies[team], run_files=self.study.run_files)
+        chunks_of_members = (member.chunk for member in members if hasattr(member, "chunk"))
         return min([CHUNK[self.study.engine], *chunks_of_members])
 
-    def _begin(self, count: int, present: int, work: str = "") -> None:
+    def _begin(self, needed: int, present: int, work: str = "") -> None:
         """Tell that a round begins, of how many missions, and how many of them are present."""
-        self.asked += count
+        self.asked += needed
         if self.announce:
             may_need_more = self.study.rule is not None
             self.announce(Round(self.rounds, self.asked, present, work, may_need_more))

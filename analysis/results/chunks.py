@@ -66,9 +66,12 @@ def short_hash(content: bytes) -> str:
 
 
 MANIFEST, LOCK = "manifest.json", ".lock"
+# What is said if another process writes into the folder, and what is allowed then.
+BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
 LONG = 150  # largest number of characters of a policy's name in the name of a folder
 BOUNDS = "bounds"  # the folder of the bounds of missions, which are the same for all policies
 FOLDERS = ("missions", "uavs", "events", BOUNDS, "failures")
+SHARDS = "shards"  # the folder of what is said of shards until the study is complete
 DERIVED = "derived"  # the folder of what answers and pages have computed from the missions
 
 
@@ -91,7 +94,7 @@ def check_places(folder: Path) -> None:
     Raises:
         InputError: If there are links, or files and folders in each other's place.
     """
-    ours = (folder / name for name in (*FOLDERS, DERIVED))
+    ours = (folder / name for name in (*FOLDERS, DERIVED, SHARDS))
     for path in (*ours, *paths_in(folder, "*/policy=*")):
         if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(path, "is a link, or not what a run would write there", ELSEWHERE)

@@ -3,11 +3,12 @@
 ``manifest.json`` describes the study and what it was run with. ``missions/`` and ``uavs/`` contain
 the records in chunks, partitioned by policy; ``events/`` contains event logs, ``bounds/`` the upper
 bounds of missions, ``failures/`` describes what could not be computed, and ``derived/`` has what
-answers and pages have computed from the missions (``derived.py``). The name of a file has
-two hashes: of its content (cells and replications), and of its bytes. So a run can resume by
-computing what is missing, and a damaged file counts as missing. A file is written completely or not
-at all. Nothing is pickled. The content of the folder does not depend on when, where, in which order
-or by how many workers it was computed, but for ``derived/``.
+answers and pages have computed from the missions (``derived.py``), and ``shards/`` which shards are
+complete, until all are (``shards.py``). The name of a file has two hashes: of its content (cells
+and replications), and of its bytes. So a run can resume by computing what is missing, and a damaged
+file counts as missing. A file is written completely or not at all. Nothing is pickled. The content
+of the folder does not depend on when, where, in which order or by how many workers it was computed,
+but for ``derived/``.
 """
 
 import json
@@ -35,10 +36,9 @@ from dess.analysis.metrics import (
     MOST_WAITING,
     columns_in_units,
 )
-from dess.analysis.results import chunks, parquet
+from dess.analysis.results import chunks, parquet, shards
 from dess.analysis.results.derived import Derived
 from dess.analysis.results.manifest import (
-    ELSEWHERE,
     NO_TEAM,
     Cell,
     CellPart,
@@ -49,7 +49,8 @@ from dess.analysis.results.replications import Present, absent_parts, gaps_betwe
 from dess.analysis.results.rows import rows_of, stack_tables, tables_of, with_worst_nodes
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import CHECK, Study
-from dess.base.files.reading import paths_in
+from dess.base.files.reading import paths_in, read_bytes
+from dess.base.files.tables import LIMIT
 from dess.base.files.writing import (
     check_folder,
     check_place,
@@ -59,9 +60,6 @@ from dess.base.files.writing import (
     make_folder,
     write_file,
 )
-
-# What is said if another process writes into the folder, and what is allowed then.
-_BUSY = ("in use by another run", f"{ELSEWHERE}, or wait for its end")
 
 # The folders of the tables of each kind of work; a chunk is present when the first one is.
 TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
@@ -139,14 +137,14 @@ class Store:
         self._logs: dict[tuple[str, int], Path] = {}  # by the key of a cell and the replication
 
     @classmethod
-    def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
+    def open(cls, manifest: Manifest, out: str | Path, accept_code: bool = False) -> Self:
         """Open a results folder for a study: a new one, or one that the study completes or extends.
 
         The folder stays locked until the end of the ``with`` block. One that is there and cannot
         be written is only read, which is enough if nothing is missing.
 
         Args:
-            study: The study.
+            manifest: The study, and what it is run with.
             out: The folder.
             accept_code: Whether to keep missions that were simulated by other code.
 
@@ -154,7 +152,6 @@ class Store:
             InputError: If a new folder cannot be written, it holds something else, or is in use.
         """
         folder = Path(out)
-        manifest = Manifest.of(study)
         store = cls(folder, _extended_manifest(folder, manifest, accept_code))
         if is_read_only(folder):
             store.is_read_only = True
@@ -162,10 +159,40 @@ class Store:
             return store
         chunks.check_places(folder)
         with ExitStack() as lock:
-            lock.enter_context(locked(folder / chunks.LOCK, *_BUSY))
+            lock.enter_context(locked(folder / chunks.LOCK, *chunks.BUSY))
+            lock.enter_context(shards.without_shards(folder))
             # Read again under the lock, because another run may have ended in the meantime.
             store.manifest = _extended_manifest(folder, manifest, accept_code)
-            store._prepare()
+            store._write_manifest()
+            store._remove_temporaries()
+            store._check_files()
+            store._scan()
+            while store.damaged:
+                delete(store.damaged.pop())
+            store._lock = lock.pop_all()
+        return store
+
+    @classmethod
+    def open_shard(
+        cls, manifest: Manifest, out: str | Path, shard: shards.Shard, accept_code: bool = False
+    ) -> Self:
+        """Open a results folder for a shard of a study, as ``open`` does.
+
+        Other shards may run there at the same time: only this shard stays locked.
+        """
+        folder = Path(out)
+        chunks.check_places(folder)
+        with ExitStack() as lock:
+            with locked(folder / chunks.LOCK, *chunks.BUSY, shards.PATIENCE):
+                store = cls(folder, _extended_manifest(folder, manifest, accept_code))
+                if not store._has_manifest():
+                    with shards.without_shards(folder):
+                        store._write_manifest()
+                lock.enter_context(locked(shard.lock(folder), *chunks.BUSY))
+                if not store.manifest.complete:
+                    shard.mark(folder, is_complete=False)
+            store._check_files()
+            store._scan()
             store._lock = lock.pop_all()
         return store
 
@@ -215,23 +242,29 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self._lock.close()
 
-    def _prepare(self) -> None:
-        """Write the manifest, remove temporary files of a killed run, and scan the folder.
+    def _has_manifest(self) -> bool:
+        """Whether the manifest is in the folder as it is here."""
+        path = self.folder / chunks.MANIFEST
+        return path.exists() and Manifest.read(path).text == self.manifest.text
+
+    def _write_manifest(self) -> None:
+        """Write the manifest, and make the folders; shards of another study are forgotten.
 
         Raises:
             InputError: If something else is in the place of a file of the study.
         """
-        write_file(self.folder / chunks.MANIFEST, self.manifest.text)
-        places = [self.folder / name for name in chunks.FOLDERS]
-        for place in places:
-            make_folder(place)
+        if not self._has_manifest():
+            shards.forget_shards(self.folder)
+            write_file(self.folder / chunks.MANIFEST, self.manifest.text)
+        for name in chunks.FOLDERS:
+            make_folder(self.folder / name)
+
+    def _remove_temporaries(self) -> None:
+        """Delete the temporary files of a killed run."""
+        places = [self.folder / name for name in (*chunks.FOLDERS, chunks.SHARDS)]
         places += [self.folder, *paths_in(self.folder, "*/policy=*")]
         for path in (path for place in places for path in paths_in(place, ".*.tmp")):
             delete(path)
-        self._check_files()
-        self._scan()
-        while self.damaged:
-            delete(self.damaged.pop())
 
     def _check_files(self) -> None:
         """Note what is no file and has the name of one; refuse it where a file has to be.
@@ -389,6 +422,18 @@ class Store:
                 (tables,) = tables_of([chunk], frames)
                 self.keep("missions", chunk, tables)
 
+    def copy_files(self, other: "Store") -> None:
+        """Copy the files that a shard of the same study has and that are not here."""
+        teams = range(len(self.manifest.policies))
+        kinds = [(kind, team) for kind in ("missions", "events") for team in teams]
+        for kind, team in [*kinds, ("bounds", NO_TEAM)]:
+            places = zip(self._places(kind, team), other._places(kind, team), strict=True)
+            for (here, _), (there, _) in places:
+                for path in parquet.files_in(there):
+                    if path not in other.damaged and not (here / path.name).exists():
+                        write_file(here / path.name, read_bytes(path, LIMIT))
+        self._scan()
+
     def merge(self, large: Sequence[chunks.Chunk]) -> None:
         """Keep the missions of a team in the files of these large chunks, in place of small ones.
 
@@ -452,6 +497,7 @@ class Store:
         write_file(self.folder / chunks.MANIFEST, self.manifest.text)
         for path in self._failures():
             delete(path)
+        shards.forget_shards(self.folder)
 
     def missions(self, parts: Sequence[CellPart]) -> pd.DataFrame:
         """The missions of some parts, with their ``point``, in the order of the parts.

@@ -15,12 +15,13 @@ from dess.base.libraries import missing
 from dess.reports.cli import console, options
 from dess.reports.cli.console import YesOption, run_or_exit
 from dess.reports.cli.report import WHAT_IF, rendering_bar
-from dess.reports.cli.studies import print_plan
+from dess.reports.cli.studies import complete_shard, print_plan
 from dess.reports.pages import PREFIX, check_pages
 
 if TYPE_CHECKING:
     from dess.analysis.ask.answer import Answer
     from dess.analysis.ask.question import Question
+    from dess.analysis.results.shards import Shard
     from dess.analysis.results.tables import Results
     from dess.reports.pages.kernels import Progress
 
@@ -53,6 +54,7 @@ def sweep(
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
+    shard: options.ShardOption = None,
     price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     require: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
     name: str | None = None,
@@ -108,6 +110,9 @@ def sweep(
     parameters = {}
     if metric:
         parameters["metric"] = question.measured_column(metric, "--metric")
+    if part := options.parse_shard(shard, [question.study], json=as_json):
+        _ask_shard(question, part, workers, dry_run, yes)
+        return
     page = f"{PREFIX}{question.study.name}"
     asked_results = _run_question(question, page, out, workers, dry_run, yes)
     _ask_around(question, asked_results, page, out, workers)
@@ -214,8 +219,7 @@ def _run_question(
     """Run a question after all checks; with --dry-run, print its plan and end the command."""
     study, folder = question.study, question.out
     if dry_run:
-        options.print_notes(question.notes)  # which an answer tells
-        print_plan(question.plan(workers), study, folder, workers)
+        _print_plan(question, workers)
         raise typer.Exit
     check_pages(out, page)
     results = run_or_exit(
@@ -226,6 +230,30 @@ def _run_question(
     )
     options.note_departures(study.policies, study.scenarios)
     return results
+
+
+def _ask_shard(
+    question: "Question", shard: "Shard", workers: int, dry_run: bool, yes: bool
+) -> None:
+    """Run a shard of a question; with --dry-run, print the plan of all shards at once."""
+    if dry_run:
+        _print_plan(question, workers, shard.total)
+        return
+    study, folder = question.study, question.out
+    complete_shard(
+        study,
+        folder,
+        shard,
+        lambda progress, announce: question.ask_shard(shard, workers, progress, announce, yes),
+        command_line("study", "run", question.file, out=folder, shard=shard),
+    )
+    console.print_text("then the same command without --shard has the answer")
+
+
+def _print_plan(question: "Question", workers: int, shards: int = 1) -> None:
+    """Print the plan of a question, with the notes that its answer has."""
+    options.print_notes(question.notes)
+    print_plan(question.plan(workers), question.study, question.out, workers * shards)
 
 
 def _ask_around(

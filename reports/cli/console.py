@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO, TypeVar
 
 import typer
 
@@ -19,6 +19,7 @@ from dess.base.files.reading import read_bytes
 from dess.base.files.writing import replacing_all
 
 LARGEST = 2**32  # bytes of a file for standard output
+AGAIN = "the same command again"  # what completes what was interrupted
 MESSAGE = 300  # the longest line that says why a command fails
 _STREAMS = {"stdout": "standard output", "stderr": "standard error"}
 
@@ -335,9 +336,10 @@ def _watch_compiling(begin: Callable[[], object], end: Callable[[], object]) -> 
 if TYPE_CHECKING:
     from dess.analysis.execution.jobs import Progress
     from dess.analysis.execution.runner import Round
-    from dess.analysis.results.tables import Results
 
     Announce = Callable[[Round], object]
+
+Found = TypeVar("Found")
 
 YesOption = Annotated[
     bool, typer.Option("--yes", help="Run it even if it has very many missions or takes long.")
@@ -346,10 +348,10 @@ YesOption = Annotated[
 
 def run_or_exit(
     name: str,
-    run: "Callable[[Progress, Announce], Results]",
-    again: str = "the same command again",
+    run: "Callable[[Progress, Announce], Found]",
+    again: str = AGAIN,
     replication: str = "mission",
-) -> "Results":
+) -> Found:
     """Run a study; an interruption (exit code 130) or a failure (1) ends the command with a line.
 
     Args:

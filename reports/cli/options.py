@@ -77,6 +77,8 @@ if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
 
     from dess import ScenarioSpace
+    from dess.analysis.results.shards import Shard
+    from dess.analysis.study.study import Study
     from dess.model.processes import TypedProcess
 
 SET = "--set"
@@ -126,7 +128,47 @@ YearsOption = Annotated[
     ),
 ]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Run on the cluster of this dask.distributed scheduler, tls://HOST:PORT or tcp://.",
+    ),
+]
+ShardOption = Annotated[
+    str | None,
+    typer.Option(
+        "--shard",
+        metavar="I/N",
+        help="Run one of N shards, such as 2/4; dess study merge joins them.",
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+
+
+def parse_shard(text: str | None, studies: "Iterable[Study]", **refused: object) -> "Shard | None":
+    """The shard that is run; None for whole studies.
+
+    Args:
+        text: What is typed.
+        studies: What is divided.
+        **refused: Options that are of whole studies.
+
+    Raises:
+        InputError: If it is no shard, a study cannot be divided, or one of the options is given.
+    """
+    if text is None:
+        return None
+    from dess.analysis.execution.runner import check_shardable
+    from dess.analysis.results.shards import Shard
+
+    shard = Shard.parse(text)
+    for study in studies:
+        check_shardable(study)
+    for option in (option for option, value in refused.items() if value):
+        raise InputError(f"--{option}", "needs all missions", "without --shard")
+    return shard
 
 
 def given(context: typer.Context, name: str) -> Any:

@@ -2,8 +2,9 @@
 
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import date
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,8 +24,11 @@ if TYPE_CHECKING:
 
     from dess.analysis.answers.diff import Diff
     from dess.analysis.execution.effort import Planned
+    from dess.analysis.execution.jobs import Progress
+    from dess.analysis.results.shards import Shard
     from dess.analysis.results.tables import Results
     from dess.analysis.study.study import Study
+    from dess.reports.cli.console import Announce
 
 TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
 
@@ -47,7 +51,8 @@ def run(
         ),
     ] = None,
     workers: options.WorkersOption = 1,
-    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
+    scheduler: options.SchedulerOption = None,
+    shard: options.ShardOption = None,
     missions: Annotated[int | None, typer.Option(min=1)] = None,
     years: options.YearsOption = None,
     policy: Annotated[
@@ -71,13 +76,13 @@ def run(
 
     Args:
         names: The names of shipped studies, or TOML files.
-        scheduler: Run on the cluster of this dask.distributed scheduler.
         missions: Missions per design point and policy.
         policy: Policies in place of those of the study; repeatable.
         dry_run: Only print the plan and the range of its time.
         accept_code: Keep missions that other code has simulated; the results say so.
     """
     from dess.analysis.execution.effort import check_run, plan_study
+    from dess.analysis.execution.runner import run_shard
     from dess.analysis.study.study import load_study
 
     changes = {"missions": missions, "years": years, "policies": policy}
@@ -89,19 +94,26 @@ def run(
     else:
         folders = [(out or options.RESULTS) / study.name for study in studies]
     runs = [*zip(studies, folders, strict=True)]
+    part = options.parse_shard(shard, studies, report=page)
+    shards = part.total if part else 1
     if dry_run:
         for study, folder in runs:
             plan = plan_study(study, folder, workers, accept_code)
-            print_plan(plan, study, folder, workers)
+            print_plan(plan, study, folder, workers * shards)
         return
     if page:
         needs("reports", "--report")
         check_pages(options.PAGES, *(f"{PREFIX}{study.name}" for study in studies))
     with console.compile_notice():
         for study, folder in runs:
-            check_run(study, folder, workers, accept_code=accept_code, yes=yes)
+            check_run(study, folder, workers, accept_code, yes=yes, shards=shards)
     for study, folder in runs:
-        _run_and_summarize(study, folder, workers, scheduler, accept_code)
+        if part:
+            about = (study, folder, part, workers, scheduler)
+            run = partial(run_shard, *about, accept_code=accept_code)
+            complete_shard(study, folder, part, run)
+        else:
+            _run_and_summarize(study, folder, workers, scheduler, accept_code)
     if page:
         from dess.analysis.results.tables import load_results
         from dess.reports.pages.render import render_study
@@ -128,6 +140,40 @@ def _run_and_summarize(
     )
     print_summary(results, out, short=True)
     console.print_text(f"more: {command_line('study', 'show', out)}")
+
+
+def complete_shard(
+    study: "Study",
+    out: Path,
+    shard: "Shard",
+    run: "Callable[[Progress, Announce], None]",
+    again: str = console.AGAIN,
+) -> None:
+    """Run a shard, and say how the shards are joined."""
+    run_or_exit(study.name, run, again, study.replication_name)
+    merge = command_line("study", "merge", out)
+    console.print_text(f"shard {shard} of study {study.name} is complete; when all are: {merge}")
+
+
+@options.add_command(app)
+def merge(
+    folders: Annotated[list[Path], typer.Argument(metavar="DIR")],
+    out: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+) -> None:
+    """Join the shards of a study, and check that nothing is missing.
+
+    The folder then has the same bytes as after dess study run without --shard.
+
+    Args:
+        folders: The results folder of the shards, or the folders if they have several.
+        out: Results folder in which they are joined.  [default: the first DIR]
+    """
+    from dess.analysis.results.merge import merge_shards
+    from dess.reports.cli.tables import print_summary
+
+    results = merge_shards(folders, out)
+    print_summary(results, results.store.folder, short=True)
+    console.print_text(f"more: {command_line('study', 'show', results.store.folder)}")
 
 
 def print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:

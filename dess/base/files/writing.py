@@ -5,6 +5,7 @@ A temporary folder that a killed process has left is removed by a later one.
 
 import json
 import os
+import platform
 import re
 import secrets
 import shutil
@@ -12,6 +13,7 @@ import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
@@ -53,8 +55,9 @@ def write_zip(path: Path, entries: Iterable[tuple[str, bytes]]) -> None:
 
 # The longest name of a file or a folder in the usual file systems [bytes].
 _LONGEST = 255
-# Temporary files and folders: the number of their process, and a random one.
-_TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
+# Temporary files and folders: the number of their process, its computer, and a random number.
+HOST = sha256(platform.node().encode()).hexdigest()[:8]
+_TEMPORARY = re.compile(rf"\.dess-(\d{{1,9}})-{HOST}[0-9a-f]+\.tmp")
 _OWN: set[Path] = set()  # temporary files and folders of this process
 
 
@@ -133,7 +136,7 @@ def _temporary(path: Path) -> Iterator[Path]:
 
 def _temporary_name(path: Path) -> Path:
     """A name beside ``path`` that belongs to this process."""
-    temporary = path.with_name(f".dess-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    temporary = path.with_name(f".dess-{os.getpid()}-{HOST}{secrets.token_hex(4)}.tmp")
     _OWN.add(temporary)
     _sweep(path.parent.absolute())
     return temporary
@@ -287,6 +290,12 @@ def delete(path: Path) -> None:
     if not path.is_dir():
         with writable(path):
             path.unlink(missing_ok=True)
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder, if there is one and nothing is in it."""
+    with suppress(OSError):
+        folder.rmdir()
 
 
 SUFFIX = ".lock"

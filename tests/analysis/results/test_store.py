@@ -11,7 +11,7 @@ from dess.analysis import load_results, load_study, run_study
 from dess.analysis.execution import runner
 from dess.analysis.results import parquet, provenance
 from dess.analysis.results.chunks import Chunk, split_into_chunks
-from dess.analysis.results.manifest import Cell, CellPart
+from dess.analysis.results.manifest import Cell, CellPart, Manifest
 from dess.analysis.results.replications import gaps_between
 from dess.analysis.results.store import Failure, Store
 from dess.policies import load
@@ -170,7 +170,7 @@ def test_a_policy_depends_on_the_modules_of_what_it_holds():
 
 def test_two_runs_of_one_folder_at_once(tmp_path):
     study = small_study(tmp_path)
-    with Store.open(study, tmp_path / "out"):
+    with Store.open(Manifest.of(study), tmp_path / "out"):
         for other in (study, small_study(tmp_path, missions=20)):
             with pytest.raises(InputError, match="in use by another run"):
                 run_study(other, tmp_path / "out")
@@ -232,7 +232,7 @@ def test_a_long_team_has_a_short_folder(tmp_path):
 
 def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
     study = small_study(tmp_path)
-    with Store.open(study, tmp_path / "out") as store:
+    with Store.open(Manifest.of(study), tmp_path / "out") as store:
         chunk = Chunk(0, (CellPart(store.manifest.cells[0][0], range(2)),))
         path = store.write_failure(chunk, Failure("greedy", 2, "no", "dess", ""))
         assert path.exists()
@@ -272,6 +272,6 @@ def test_small_files_are_joined_into_those_of_any_size(size, tmp_path, monkeypat
     for name, of_chunk in (("joined", 2), ("expected", size)):
         monkeypatch.setitem(runner.CHUNK, "batch", of_chunk)
         run_study(study, tmp_path / name)
-    with Store.open(study, tmp_path / "joined") as store:
+    with Store.open(Manifest.of(study), tmp_path / "joined") as store:
         store.merge([*split_into_chunks(store.manifest.parts_of_team(0, [5, 5]), size)])
     assert files_of(tmp_path / "joined") == files_of(tmp_path / "expected")

@@ -22,6 +22,7 @@ from dess.base.files.reading import (
     read_text,
 )
 from dess.base.files.writing import (
+    HOST,
     check_folder,
     check_new_folder,
     check_target,
@@ -172,13 +173,14 @@ def test_files_are_written_with_their_folders_all_or_none(tmp_path):
 def test_the_next_process_deletes_what_a_killed_one_has_left(tmp_path):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    names = [f".dess-{n}-12345678.tmp" for n in (dead.pid, os.getpid(), os.getppid())]
-    for name in (*names, other := f".notes-{dead.pid}.tmp"):
+    names = [f".dess-{n}-{HOST}1234.tmp" for n in (dead.pid, os.getpid(), os.getppid())]
+    elsewhere = f".dess-{dead.pid}-123456789012.tmp"  # of another computer
+    for name in (*names, elsewhere, other := f".notes-{dead.pid}.tmp"):
         (tmp_path / name).touch()
-    (folder := tmp_path / f".dess-{dead.pid}-0.tmp").mkdir()
+    (folder := tmp_path / f".dess-{dead.pid}-{HOST}0.tmp").mkdir()
     (folder / "half").touch()
     write_file(tmp_path / "file", "")
-    assert {*files_of(tmp_path)} == {"file", other, *names[1:]}
+    assert {*files_of(tmp_path)} == {"file", other, elsewhere, *names[1:]}
 
 
 def test_a_folder_is_there_with_all_its_files_or_not_at_all(tmp_path):
