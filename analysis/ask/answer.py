@@ -350,6 +350,7 @@ def sweep(
     years: int | None = None,
     progress: bool | Progress = True,
     yes: bool = False,
+    scheduler: str | None = None,
     **fields: Any,
 ) -> SweepAnswer:
     """Simulate every combination of values of fields, and store the missions.
@@ -377,6 +378,7 @@ def sweep(
         progress: Whether to show a progress bar, or a function that is called with the number of
             missions done since its last call.
         yes: Whether the sweep may take more than an hour.
+        scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
         **fields: Fields of the scenario. A single value is fixed; a list, range, tuple or array of
             values is swept. ``initial_data=[5, 20]`` is one range; see ``values_of``.
 
@@ -398,7 +400,7 @@ def sweep(
         folder=folder,
         years=years,
     )
-    return settings_answer(_ask(question, workers, progress, yes), question)
+    return settings_answer(_ask(question, workers, progress, yes, scheduler), question)
 
 
 def what_if(
@@ -416,6 +418,7 @@ def what_if(
     years: int | None = None,
     progress: Progress | None = None,
     yes: bool = False,
+    scheduler: str | None = None,
 ) -> VariationAnswer:
     """Simulate a baseline and a variation of it with common random numbers, and compare them.
 
@@ -438,6 +441,7 @@ def what_if(
         years: Years of weather, in place of missions; 10 by default where a scenario has weather.
         progress: Called with the number of missions done since its last call.
         yes: Whether the question may take more than an hour.
+        scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
 
     Raises:
         InputError: Before anything is written, if a field, a value, a policy or a price is unknown
@@ -455,7 +459,7 @@ def what_if(
         years=years,
     )
     check_shown(question, shown)
-    return VariationAnswer(_ask(question, workers, progress, yes), question, shown)
+    return VariationAnswer(_ask(question, workers, progress, yes, scheduler), question, shown)
 
 
 def check_shown(question: Question, policy: str | None) -> None:
@@ -469,12 +473,18 @@ def check_shown(question: Question, policy: str | None) -> None:
         raise unknown_name("shown", f"{policy!r} is not asked about", policy, asked)
 
 
-def _ask(question: Question, workers: int, progress: bool | Progress | None, yes: bool) -> Results:
+def _ask(
+    question: Question,
+    workers: int,
+    progress: bool | Progress | None,
+    yes: bool,
+    scheduler: str | None,
+) -> Results:
     """Ask a question, with a progress bar if ``progress`` is True."""
     if progress is True:
         with _progress_bar() as (bar, announce):
-            return question.ask(workers, bar, announce, yes)
-    return question.ask(workers, progress or None, yes=yes)
+            return question.ask(workers, bar, announce, yes, scheduler)
+    return question.ask(workers, progress or None, yes=yes, scheduler=scheduler)
 
 
 @contextmanager

@@ -117,6 +117,7 @@ class Question:
         progress: Progress | None = None,
         announce: Callable[[Round], object] | None = None,
         yes: bool = False,
+        scheduler: str | None = None,
     ) -> Results:
         """Write the file of the study, and simulate the missions that no question there has.
 
@@ -125,6 +126,7 @@ class Question:
             progress: Called with the number of missions done since its last call.
             announce: Called before each round.
             yes: Whether a question of any length is allowed.
+            scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
 
         Raises:
             InputError: Before anything is written, if a policy cannot act in the scenario, the
@@ -134,7 +136,7 @@ class Question:
         """
         reuse = self.others
         self._begin(workers, yes, reuse)
-        return run_study(self.study, self.out, workers, None, progress, announce, reuse=reuse)
+        return run_study(self.study, self.out, workers, scheduler, progress, announce, reuse=reuse)
 
     def ask_shard(
         self,
@@ -143,13 +145,14 @@ class Question:
         progress: Progress | None = None,
         announce: Callable[[Round], object] | None = None,
         yes: bool = False,
+        scheduler: str | None = None,
     ) -> None:
         """Write the file of the study, and simulate a shard of it; nothing is copied.
 
         Args and errors are those of ``ask`` and ``run_shard``.
         """
         self._begin(workers, yes, shards=shard.total)
-        run_shard(self.study, self.out, shard, workers, None, progress, announce)
+        run_shard(self.study, self.out, shard, workers, scheduler, progress, announce)
 
     def _begin(self, workers: int, yes: bool, reuse: Sequence[Path] = (), shards: int = 1) -> None:
         """Check that the question can be asked, and write the file of the study."""

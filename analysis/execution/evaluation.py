@@ -14,14 +14,14 @@ from dess import InputError, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.execution import effort
 from dess.analysis.execution.jobs import (
-    CHUNK,
     Job,
     MissionsJob,
     Problem,
     Progress,
+    chunk_size,
     simulate_missions,
 )
-from dess.analysis.execution.workers import Here, Pool
+from dess.analysis.execution.workers import Pool, pool_of
 from dess.analysis.measured import measured_in, recorded_metrics
 from dess.analysis.metric_ranges import metric_in_space
 from dess.analysis.metrics import METRICS, NODES_BEHIND, WINDOWS, columns_in_units
@@ -73,6 +73,7 @@ class Asked(NamedTuple):
         workers: Threads of the batch engine, processes of the event engine.
         run_files: Whether Python files of the team may be run, since a user has typed it.
         processes: The processes of the user in every mission, who has typed them.
+        scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
     """
 
     scenario: ScenarioSpace
@@ -83,6 +84,7 @@ class Asked(NamedTuple):
     workers: int = 1
     run_files: bool = False
     processes: tuple[str, ...] = ()
+    scheduler: str | None = None
 
     def load_policies(self) -> list[Policy]:
         """The policies of the team."""
@@ -336,30 +338,35 @@ def _simulate_pieces(
     asked: Asked, pieces: Iterable[range], progress: Progress | None
 ) -> Iterator[tuple[Records, float]]:
     """The records of each piece of the replications, and the time of the simulation alone [s]."""
-    policies = asked.load_policies()
-    pool = Here(asked.workers)
-    about = (asked.scenario, policies, asked.seed)
+    with pool_of(asked.workers, asked.scheduler) as pool:
+        _warm_up(asked, pool)
+        for piece in pieces:
+            begin = perf_counter()
+            if asked.engine == "batch" and not asked.scheduler:
+                about = (asked.scenario, asked.load_policies(), asked.seed, piece)
+                records = simulate_batch(*about, workers=asked.workers, progress=progress)
+            else:
+                records = _results_in_order(pool, _jobs(asked, piece), progress)
+            yield records, perf_counter() - begin
+
+
+def _warm_up(asked: Asked, pool: Pool) -> None:
+    """Compile the batch engine, or start the processes of this machine."""
+    if asked.scheduler:
+        return
     if asked.engine == "batch":
-        simulate_batch(about[0].without_weather(), *about[1:], 1)  # compiles
-    else:
-        first = _event_jobs(asked, range(1))
-        _results_in_order(
-            pool, first * (1 if asked.workers == 1 else 2 * asked.workers)
-        )  # starts processes
-    for piece in pieces:
-        begin = perf_counter()
-        if asked.engine == "batch":
-            records = simulate_batch(*about, piece, workers=asked.workers, progress=progress)
-        else:
-            records = _results_in_order(pool, _event_jobs(asked, piece), progress)
-        yield records, perf_counter() - begin
+        simulate_batch(asked.scenario.without_weather(), asked.load_policies(), asked.seed, 1)
+        return
+    starts = 1 if asked.workers == 1 else 2 * asked.workers
+    _results_in_order(pool, _jobs(asked, range(1)) * starts)
 
 
-def _event_jobs(asked: Asked, replications: range) -> list[Job]:
-    """Jobs of the event engine."""
-    chunks = split_into_chunks([CellPart(Cell(0, 0, "", 0), replications)], CHUNK["events"])
+def _jobs(asked: Asked, replications: range) -> list[Job]:
+    """The jobs of some missions."""
+    size = chunk_size(asked.engine, asked.load_policies())
+    chunks = split_into_chunks([CellPart(Cell(0, 0, "", 0), replications)], size)
     spaces = (asked.scenario,)
-    about = (asked.team, asked.seed, "events", asked.run_files, asked.processes)
+    about = (asked.team, asked.seed, asked.engine, asked.run_files, asked.processes)
     return [MissionsJob(chunk, spaces, *about) for chunk in chunks]
 
 

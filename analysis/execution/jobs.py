@@ -3,7 +3,7 @@
 import errno
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -25,12 +25,17 @@ from dess.analysis.results.store import Store
 from dess.model.mission import Process
 from dess.model.processes import load_processes
 from dess.model.record import Records, empty_records_of
-from dess.policies.registry import load_team
+from dess.policies.registry import Policy, load_team
 from dess.scenario.scenario import ScenarioSpace
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
 # interrupted.
 CHUNK = {"batch": 500, "events": 50}
+
+
+def chunk_size(engine: str, team: Iterable[Policy]) -> int:
+    """The number of missions of a chunk of a team; a slow policy has its own (``chunk``)."""
+    return min([CHUNK[engine], *(policy.chunk for policy in team if hasattr(policy, "chunk"))])
 
 
 def simulate_missions(

@@ -24,8 +24,9 @@ from dess.analysis.execution.jobs import (
     MissionsJob,
     Problem,
     Progress,
+    chunk_size,
 )
-from dess.analysis.execution.workers import Cluster, Here, Pool
+from dess.analysis.execution.workers import Pool, pool_of
 from dess.analysis.results import chunks, tables
 from dess.analysis.results.manifest import CellPart, Manifest, Selected
 from dess.analysis.results.replications import Present, gaps_between
@@ -110,7 +111,7 @@ def run_study(
         study = load_study(study)
     check_workers(workers)
     with (
-        _pool(workers, scheduler) as pool,
+        pool_of(workers, scheduler) as pool,
         Store.open(Manifest.of(study), out, accept_code) as store,
     ):
         _Run(study, store, pool, progress, announce, reuse).complete()
@@ -148,7 +149,7 @@ def run_shard(
     check_workers(workers)
     manifest = Manifest.of(study)
     with (
-        _pool(workers, scheduler) as pool,
+        pool_of(workers, scheduler) as pool,
         Store.open_shard(manifest, out, shard, accept_code) as store,
     ):
         _Run(study, store, pool, progress, announce, shard=shard).compute_shard()
@@ -165,10 +166,6 @@ def check_shardable(study: Study) -> None:
     if study.rule:
         problem = f"a rule decides round by round how many missions study {study.name} has"
         raise InputError("--shard", problem, "--scheduler ADDRESS, or the study as a whole")
-
-
-def _pool(workers: int, scheduler: str | None) -> Pool:
-    return Cluster(scheduler) if scheduler else Here(workers)
 
 
 @dataclass
@@ -317,8 +314,7 @@ class _Run:
         if kind is not MissionsJob:
             return BOUNDS_CHUNK if kind is BoundsJob else 1
         members = load_team(self.study.policies[team], run_files=self.study.run_files)
-        chunks_of_members = (member.chunk for member in members if hasattr(member, "chunk"))
-        return min([CHUNK[self.study.engine], *chunks_of_members])
+        return chunk_size(self.study.engine, members)
 
     def _begin(self, needed: int, present: int, work: str = "") -> None:
         """Tell that a round begins, of how many missions, and how many of them are present."""

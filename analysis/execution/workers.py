@@ -195,7 +195,7 @@ GONE = (OSError, asyncio.CancelledError, CancelledError)  # raised where a sched
 NOISY = ("distributed", "tornado", "asyncio")  # libraries that log what goes wrong
 
 
-class SchedulerError(Exception):
+class SchedulerError(ConnectionError):
     """The scheduler of a cluster is gone; what had been computed before is complete."""
 
 
@@ -321,6 +321,13 @@ class Cluster(Pool):
     def _leave(self) -> None:
         with suppress(Exception):  # the scheduler may be gone
             self.client.close(timeout=GOODBYE)
+
+
+def pool_of(workers: int, scheduler: str | None) -> Pool:
+    """The cluster of a scheduler, or without one as many workers on this machine."""
+    if scheduler:
+        return Cluster(scheduler)
+    return Here(workers)
 
 
 async def _kind(address: str) -> str:

@@ -54,6 +54,7 @@ def sweep(
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
+    scheduler: options.SchedulerOption = None,
     shard: options.ShardOption = None,
     price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     require: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
@@ -110,12 +111,13 @@ def sweep(
     parameters = {}
     if metric:
         parameters["metric"] = question.measured_column(metric, "--metric")
+    machines = options.Machines(workers, scheduler)
     if part := options.parse_shard(shard, [question.study], json=as_json):
-        _ask_shard(question, part, workers, dry_run, yes)
+        _ask_shard(question, part, machines, dry_run, yes)
         return
     page = f"{PREFIX}{question.study.name}"
-    asked_results = _run_question(question, page, out, workers, dry_run, yes)
-    _ask_around(question, asked_results, page, out, workers)
+    asked_results = _run_question(question, page, out, machines, dry_run, yes)
+    _ask_around(question, asked_results, page, out, machines)
     answer = settings_answer(asked_results, question, parameters.get("metric"))
 
     def render(progress: "Progress") -> Path:
@@ -149,6 +151,7 @@ def what_if(
     scenario: options.ScenarioOption = "paper",
     seed: options.SeedOption = 0,
     workers: options.WorkersOption = 1,
+    scheduler: options.SchedulerOption = None,
     price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
     shown: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
     results: Annotated[Path, typer.Option(metavar="DIR")] = options.RESULTS,
@@ -191,7 +194,8 @@ def what_if(
         years=years,
     )
     check_shown(question, shown)
-    asked_results = _run_question(question, WHAT_IF, out, workers, dry_run, yes)
+    machines = options.Machines(workers, scheduler)
+    asked_results = _run_question(question, WHAT_IF, out, machines, dry_run, yes)
     answer = VariationAnswer(asked_results, question, shown)
     parameters = {
         "settings": changes,
@@ -214,17 +218,19 @@ def what_if(
 
 
 def _run_question(
-    question: "Question", page: str, out: Path, workers: int, dry_run: bool, yes: bool
+    question: "Question", page: str, out: Path, machines: options.Machines, dry_run: bool, yes: bool
 ) -> "Results":
     """Run a question after all checks; with --dry-run, print its plan and end the command."""
     study, folder = question.study, question.out
     if dry_run:
-        _print_plan(question, workers)
+        _print_plan(question, machines.workers)
         raise typer.Exit
     check_pages(out, page)
     results = run_or_exit(
         study.name,
-        lambda progress, announce: question.ask(workers, progress, announce, yes),
+        lambda progress, announce: question.ask(
+            machines.workers, progress, announce, yes, machines.scheduler
+        ),
         command_line("study", "run", question.file, out=folder),
         study.replication_name,
     )
@@ -233,18 +239,20 @@ def _run_question(
 
 
 def _ask_shard(
-    question: "Question", shard: "Shard", workers: int, dry_run: bool, yes: bool
+    question: "Question", shard: "Shard", machines: options.Machines, dry_run: bool, yes: bool
 ) -> None:
     """Run a shard of a question; with --dry-run, print the plan of all shards at once."""
     if dry_run:
-        _print_plan(question, workers, shard.total)
+        _print_plan(question, machines.workers, shard.total)
         return
     study, folder = question.study, question.out
     complete_shard(
         study,
         folder,
         shard,
-        lambda progress, announce: question.ask_shard(shard, workers, progress, announce, yes),
+        lambda progress, announce: question.ask_shard(
+            shard, machines.workers, progress, announce, yes, machines.scheduler
+        ),
         command_line("study", "run", question.file, out=folder, shard=shard),
     )
     console.print_text("then the same command without --shard has the answer")
@@ -257,7 +265,7 @@ def _print_plan(question: "Question", workers: int, shards: int = 1) -> None:
 
 
 def _ask_around(
-    question: "Question", results: "Results", page: str, out: Path, workers: int
+    question: "Question", results: "Results", page: str, out: Path, machines: options.Machines
 ) -> None:
     """Ask what one more UAV or pad brings to the cheapest fleet, and what the fleet bears."""
     from dess.analysis.ask.around import question_around
@@ -265,11 +273,11 @@ def _ask_around(
 
     scenario = question.study.scenario
     if question.study.selection and (changes := question_around(results, scenario)):
-        _run_question(changes, page, out, workers, dry_run=False, yes=True)
+        _run_question(changes, page, out, machines, dry_run=False, yes=True)
         if question.study.years:  # limits are of a wind and of failures in single missions
             return
         with console.compile_notice(), console.progress_bar("mission") as shown:
-            find_limits(results, scenario, workers, shown.update)
+            find_limits(results, scenario, machines.workers, shown.update)
 
 
 def _print_answer(

@@ -41,6 +41,7 @@ def evaluate(
     engine: Literal["batch", "events"] | None = None,
     process: options.ProcessOption = None,
     workers: options.WorkersOption = 1,
+    scheduler: options.SchedulerOption = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     yes: YesOption = False,
     as_json: options.JsonOption = False,
@@ -67,6 +68,7 @@ def evaluate(
     from dess.analysis.study.study import engine_of, replications_of
     from dess.model.record import measures_of
 
+    machines = options.Machines(workers, scheduler)
     space = options.load_space(scenario, settings)
     replications = replications_of(space, options.given(context, "missions"), years, missions)
     ((unit, number),) = replications.items()
@@ -80,10 +82,13 @@ def evaluate(
             "seed": seed,
             "engine": engine,
         }
-        evaluations = _evaluate_as_study(study, processes, out, workers, yes)
+        evaluations = _evaluate_as_study(study, processes, out, machines, yes)
     else:
         about = (number, seed, engine, workers)
-        asked = [Asked(space, team, *about, run_files=True, processes=processes) for team in policy]
+        first = Asked(
+            space, policy[0], *about, run_files=True, processes=processes, scheduler=scheduler
+        )
+        asked = [first._replace(team=team) for team in policy]
         with console.compile_notice():
             check_evaluation(asked, yes)
         with (
@@ -127,7 +132,11 @@ def evaluate(
 
 
 def _evaluate_as_study(
-    data: dict[str, Any], processes: Sequence[str], out: Path, workers: int, yes: bool
+    data: dict[str, Any],
+    processes: Sequence[str],
+    out: Path,
+    machines: options.Machines,
+    yes: bool,
 ) -> "list[Evaluation]":
     """Run the scenario as a study, which is named after its folder."""
     from dess.analysis.execution.effort import check_run
@@ -139,12 +148,12 @@ def _evaluate_as_study(
     data |= {"name": name[:MOST_CHARACTERS] or "evaluation", "description": "an evaluation"}
     study = study_from(data, "evaluate", run_files=True, processes=processes)
     with console.compile_notice():
-        check_run(study, out, workers, yes=yes)
+        check_run(study, out, machines.workers, yes=yes)
     options.note_departures(study.policies, study.scenarios)
     return of_results(
         console.run_or_exit(
             study.name,
-            lambda progress, announce: run_study(study, out, workers, None, progress, announce),
+            lambda progress, announce: run_study(study, out, *machines, progress, announce),
         )
     )
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from decimal import Decimal, InvalidOperation
 from inspect import getdoc, getsource
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
@@ -145,6 +145,13 @@ ShardOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+
+
+class Machines(NamedTuple):
+    """Where missions are simulated: by processes of this machine, or on a cluster."""
+
+    workers: int
+    scheduler: str | None
 
 
 def parse_shard(text: str | None, studies: "Iterable[Study]", **refused: object) -> "Shard | None":

@@ -11,9 +11,10 @@ from contextlib import ExitStack
 
 import pytest
 
-from dess import InputError
+from dess import InputError, load_scenario
 from dess.analysis import run_study
 from dess.analysis.execution import workers
+from dess.analysis.execution.evaluation import Asked, estimate_means
 from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK
 from dess.analysis.execution.workers import Cluster, _check_and_run
@@ -111,6 +112,39 @@ def test_a_worker_that_cannot_run_a_job_is_one_line(tmp_path, monkeypatch):
         line = "a worker cannot run jobs: ModuleNotFoundError: No module named 'analysis'"
         with pytest.raises(InputError, match=line):
             run_study(small_study(tmp_path), tmp_path / "out", scheduler=cluster.scheduler_address)
+
+
+@pytest.mark.parametrize("engine", ["batch", "events"])
+def test_a_cluster_evaluates_as_this_machine_does(engine, monkeypatch):
+    monkeypatch.setitem(CHUNK, engine, 7)
+    asked = Asked(load_scenario("paper", max_slots=60), "greedy", missions=20, engine=engine)
+    with distributed.LocalCluster(n_workers=1, processes=False, **OPTIONS) as cluster:
+        there = estimate_means(asked._replace(scheduler=cluster.scheduler_address))
+    here = estimate_means(asked)
+    assert there.moments == here.moments
+    assert there.compared.equals(here.compared)
+
+
+RUN = ["study", "run", "trial.toml", "--out", "out"]
+ASK = ["--scenario", "small.toml", "--policy", "greedy"]
+COMMANDS = [
+    RUN,
+    [*RUN, "--shard", "1/2"],
+    ["evaluate", *ASK],
+    ["evaluate", *ASK, "--out", "out"],
+    ["sweep", *ASK, "--set", "uavs=1,2"],
+    ["sweep", *ASK, "--set", "uavs=1,2", "--shard", "1/2"],
+    ["what-if", *ASK, "--set", "uavs=1"],
+]
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_every_long_command_may_run_on_a_cluster(words, tmp_path, monkeypatch, capfd):
+    small_study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*words, "--scheduler", "nonsense"]) == 2
+    assert "dess: error: scheduler: nonsense: " in capfd.readouterr().err
+    assert not [*tmp_path.rglob("*.parquet")]
 
 
 ADDRESSES = {

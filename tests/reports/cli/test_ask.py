@@ -9,7 +9,7 @@ import pytest
 
 from dess.analysis import load_results, load_study
 from dess.analysis.ask.question import Question
-from dess.analysis.execution import runner
+from dess.analysis.execution import runner, workers
 from tests.analysis.small import files_of
 
 ASKED = ["sweep", "--scenario", "small.toml", "--missions", 6, "--policy", "greedy,random"]
@@ -112,7 +112,7 @@ def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_pa
 
 def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkeypatch):
     monkeypatch.setitem(runner.CHUNK, "batch", 4)
-    simulate, calls = runner.Here.run, []
+    simulate, calls = workers.Here.run, []
 
     def interrupted(self, jobs, progress):
         for done in simulate(self, jobs, progress):
@@ -122,7 +122,7 @@ def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkey
             yield done
 
     with monkeypatch.context() as patch:
-        patch.setattr(runner.Here, "run", interrupted)
+        patch.setattr(workers.Here, "run", interrupted)
         code, out, err = dess(*ASKED, *FIELDS)
     assert (code, out) == (130, "")
     command = re.search(r"interrupted: run (dess study run .*) to complete it", err)[1]

@@ -98,7 +98,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(arguments, refusal, monkeypa
     def mission(*_, **__):
         raise AssertionError("a mission was simulated")
 
-    monkeypatch.setattr(runner.Here, "run", mission)
+    monkeypatch.setattr(workers.Here, "run", mission)
     monkeypatch.setattr(evaluation, "estimate_means", mission)
     monkeypatch.setattr(Mission, "run", mission)
     line = refusal(*arguments.split(" "))
