@@ -1,7 +1,6 @@
 """Ablation of the batch engine: its speed without each of its optimisations.
 
-Every variant is a copy of the packages with one line changed. All give the same records. The table
-goes into docs/performance.md.
+Every variant is a copy of the packages with one line changed. All give the same records.
 
     python benchmarks/ablations.py
 """
