@@ -5,7 +5,7 @@ All checks of a command come before its first mission.
 
 import pytest
 
-from dess.analysis.execution import evaluation, runner
+from dess.analysis.execution import evaluation, workers
 from dess.model.mission import Mission
 
 SWEEP = "sweep --scenario small.toml --set uavs=1,2 --missions 3"
