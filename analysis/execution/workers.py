@@ -188,6 +188,7 @@ def _numbered_result(number: int, job: Job) -> tuple[int, Any]:
 
 log = logging.getLogger(__name__)
 
+ADDRESS = "tls://HOST:PORT or tcp://HOST:PORT of a scheduler"
 ANSWER = 10.0  # seconds in which a scheduler must answer
 LOOK = 5.0  # seconds without a result after which to look whether there are workers
 GOODBYE = 3.0  # seconds to take leave of a scheduler
@@ -304,7 +305,7 @@ class Cluster(Pool):
             raise self._refusal(reason, "workers with the same libraries")
         return future.result()
 
-    def _refusal(self, problem: str, allowed: str = "tcp://HOST:PORT of a scheduler") -> InputError:
+    def _refusal(self, problem: str, allowed: str = ADDRESS) -> InputError:
         return InputError(f"scheduler: {self.address}", problem, allowed)
 
     def _greet(self) -> None:
@@ -313,6 +314,9 @@ class Cluster(Pool):
         Raises:
             InputError: If it is something else.
         """
+        if self.address.startswith("tls://") and not _connection().get("ssl_context"):
+            allowed = "a configuration of dask with certificates, see docs/how-to/distributed.md"
+            raise self._refusal("no certificates are configured for it", allowed)
         with ThreadPoolExecutor(1) as thread:  # this one may have an event loop, as in a notebook
             kind = thread.submit(asyncio.run, _kind(self.address)).result()
         if kind != "Scheduler":
@@ -330,13 +334,19 @@ def pool_of(workers: int, scheduler: str | None) -> Pool:
     return Here(workers)
 
 
+def _connection() -> dict[str, Any]:
+    """How a client connects, by the configuration of dask: with TLS if there are certificates."""
+    from distributed.security import Security
+
+    connection: dict[str, Any] = Security().get_connection_args("client")
+    return connection
+
+
 async def _kind(address: str) -> str:
     """What kind of server of dask answers at an address."""
     from distributed import rpc
-    from distributed.security import Security
 
-    arguments = Security().get_connection_args("client")
-    async with rpc(address, timeout=ANSWER, connection_args=arguments) as server:
+    async with rpc(address, timeout=ANSWER, connection_args=_connection()) as server:
         identity = await asyncio.wait_for(server.identity(), ANSWER)
     return str(identity["type"])
 

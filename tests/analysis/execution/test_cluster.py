@@ -150,7 +150,7 @@ def test_every_long_command_may_run_on_a_cluster(words, tmp_path, monkeypatch, c
 ADDRESSES = {
     "nonsense": "missing port number",
     "silent": "no scheduler answers within",
-    "worker": "is a Worker; allowed: tcp://HOST:PORT of a scheduler",
+    "worker": "is a Worker; allowed: tls://HOST:PORT or tcp://HOST:PORT of a scheduler",
 }
 
 

@@ -4,6 +4,7 @@ import pytest
 
 from dess import InputError
 from dess.analysis import run_study, sweep
+from dess.analysis.execution.jobs import MissionsJob
 from dess.analysis.execution.runner import CHUNK, run_shard
 from dess.analysis.results import shards
 from dess.analysis.results.manifest import Manifest
@@ -159,6 +160,19 @@ def test_what_is_no_shard_is_one_line(line, tmp_path, monkeypatch, capfd):
     assert (out, err.count("\n")) == ("", 1)
     assert f"dess: error: {line}" in err
     assert files_of(tmp_path) == before
+
+
+def test_an_interrupt_is_one_line(tmp_path, monkeypatch, capfd):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    small_study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(MissionsJob, "run", interrupt)
+    assert cli.main([*WORDS, "--shard", "1/2", "--yes"]) == 130
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.endswith("\ninterrupted: run the same command again to complete it\n")
 
 
 def test_a_sweep_in_shards_is_answered_at_once(tmp_path, monkeypatch, capfd):
