@@ -41,7 +41,7 @@ def needed_draws(
 def _count(state, world, scratch, actions):
     """Simulate one mission and count."""
     mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
-    sensors, teeth = state.sensors[0], state.teeth[0]
+    sensors, peaks = state.sensors[0], state.peaks[0]
     nodes, mean_snr, order, means, chart = world
     batches, search, _ = scratch
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
@@ -57,7 +57,7 @@ def _count(state, world, scratch, actions):
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
             rules.communicate(
-                mission, uavs, residual, sensors, teeth, order, means, batches, search, n
+                mission, uavs, residual, sensors, peaks, order, means, batches, search, n
             )  # fmt: skip
             for i in range(mission.uavs):
                 if not uavs[i].active or uavs[i].charging or uavs[i].served < 0:

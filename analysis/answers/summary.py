@@ -26,11 +26,11 @@ def means_of_points(results: Results) -> pd.DataFrame:
         search, the intervals allow for it (``stats.kinds.level_after``).
     """
     cell = ["policy", "point"]
-    looks = {name: results.looks(name) for name in results.policies}
-    if not any(of_policy.any() for of_policy in looks.values()):
+    analyses = {name: results.analyses(name) for name in results.policies}
+    if not any(of_policy.any() for of_policy in analyses.values()):
         return summary(results.missions, by=cell)
     tables = [
-        summary(missions, cell, float(level_after(looks[policy][point])))
+        summary(missions, cell, float(level_after(analyses[policy][point])))
         for (policy, point), missions in results.missions.groupby(cell, sort=False)
     ]
     return pd.concat(tables, ignore_index=True)
@@ -76,8 +76,10 @@ def add_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             continue
         wide = by_replication(missions, str(metric), "policy")
         values = wide[rows["policy"]].to_numpy(float)
-        looks = np.array([results.looks(policy)[point] for policy in rows["policy"]])
-        verdicts[rows.index] = judge_alternatives(values, rows["low"], rows["high"], measure, looks)
+        analyses = np.array([results.analyses(policy)[point] for policy in rows["policy"]])
+        verdicts[rows.index] = judge_alternatives(
+            values, rows["low"], rows["high"], measure, analyses
+        )
     return means.assign(verdict=verdicts)
 
 

@@ -252,7 +252,7 @@ class Results:
         parts = manifest.parts_of_team(self.policies.index(policy))
         return rule.choice(self.store.samples(parts), manifest.settings)
 
-    def looks(self, policy: str) -> np.ndarray:
+    def analyses(self, policy: str) -> np.ndarray:
         """How often a search could have ended the missions of each design point of a policy.
 
         Returns:
@@ -262,7 +262,7 @@ class Results:
         selected = self.choice(policy) or self.cheapest(policy)
         if selected is None or self.missions is self.checks:
             return np.zeros(len(self.store.manifest.points), int)
-        return np.array(selected.looks)
+        return np.array(selected.analyses)
 
     def missions_of(self, policy: str | None) -> pd.DataFrame:
         """The missions of a policy; without one, those of all.

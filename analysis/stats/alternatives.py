@@ -45,7 +45,7 @@ def judge_alternatives(
     low: pd.Series,
     high: pd.Series,
     metric: Metric,
-    looks: np.ndarray,
+    analyses: np.ndarray,
     left: np.ndarray | None = None,
 ) -> np.ndarray:
     """How each of several alternatives compares with all others, on common replications.
@@ -58,7 +58,7 @@ def judge_alternatives(
         low: (K,) lower ends of the intervals of their means.
         high: (K,) upper ends.
         metric: The metric; the ends of its range may be (K,) arrays.
-        looks: (K,) how often a search could have ended the missions of each.
+        analyses: (K,) how often a search could have ended the missions of each.
         left: (K,) those that a selection has not ruled out; the others are ``WORSE``. By default
             all.
 
@@ -70,12 +70,12 @@ def judge_alternatives(
         return np.array([ONLY], object)
     if left is not None and not left.all():
         verdicts = np.full(values.shape[1], WORSE, object)
-        those = values[:, left], low[left], high[left], metric.at(left), looks[left]
+        those = values[:, left], low[left], high[left], metric.at(left), analyses[left]
         verdicts[left] = judge_alternatives(*those)
         verdicts[verdicts == ONLY] = BEST
         return verdicts
-    may_be = may_be_best(values, metric, looks) & within_reach(low, high, metric).to_numpy()
-    leads = may_be & may_be_best(values, metric, looks, allowance=False)
+    may_be = may_be_best(values, metric, analyses) & within_reach(low, high, metric).to_numpy()
+    leads = may_be & may_be_best(values, metric, analyses, allowance=False)
     if not leads.any():
         leads = may_be
     first = TIED
@@ -94,7 +94,7 @@ def may_lead(verdicts: np.ndarray) -> np.ndarray:
 def may_be_best(
     values: np.ndarray,
     metric: str | Metric = "",
-    looks: np.ndarray | None = None,
+    analyses: np.ndarray | None = None,
     allowance: bool = True,
 ) -> np.ndarray:
     """The settings that no other setting is significantly better than.
@@ -105,14 +105,14 @@ def may_be_best(
     Technometrics; see also Hsu 1984, Annals of Statistics) with Bonferroni's bound for settings
     that share their random numbers (Nelson, Swann, Goldsman and Song 2001, Operations Research).
     After a search, whose numbers of missions depend on their results, each pair is tested at the
-    error of its look (``kinds.level_after``).
+    error of its interim analysis (``kinds.level_after``).
 
     Args:
         values: (R, K) values of K settings in R replications; nan means that a setting lacks a
             replication. Two settings are compared on the replications of both.
         metric: The metric, by default one of which more is better. Its rare differences are
             added, as in ``dess.analysis.compare``. The ends of its range may be (K,) arrays.
-        looks: (K,) how often a search could have ended the missions of each setting; by default
+        analyses: (K,) how often a search could have ended the missions of each setting; by default
             their number is fixed.
         allowance: Whether the rare differences are added. Without them, the settings are those that
             may be the best by what was seen, and the probability above is lower.
@@ -130,15 +130,15 @@ def may_be_best(
     centre = np.nanmean(np.where(present.any(1, keepdims=True), values, 0.0), axis=1, keepdims=True)
     centred = np.where(present, values - centre, 0.0)
     mask = present.astype(float)
-    if looks is None:
-        looks = np.zeros(values.shape[1], int)
+    if analyses is None:
+        analyses = np.zeros(values.shape[1], int)
     error_of_policy = (1 - LEVEL) / max(values.shape[1] - 1, 1) / measure.among
     blocks = [slice(b, b + _BLOCK) for b in range(0, values.shape[1], _BLOCK)]
     rare: list[Any] = [None] * len(blocks)
     if allowance:
         rare = [_rare_leads(measure, means, block) for block in blocks]
     # The missions that a pair shares end with those of the setting that has fewer.
-    shared = [np.minimum(looks[block, None], looks) for block in blocks]
+    shared = [np.minimum(analyses[block, None], analyses) for block in blocks]
     alphas = [1 - level_after(of_pairs, 1 - error_of_policy) for of_pairs in shared]
     parts = [
         _unbeaten_settings(block, added, centred, mask, alpha)

@@ -193,19 +193,20 @@ def ends_of_means(metric: Metric, sample: Sample, level: Any = LEVEL) -> tuple[A
     return low, high
 
 
-def level_after(looks: Any, level: float = LEVEL) -> Any:
+def level_after(analyses: Any, level: float = LEVEL) -> Any:
     """The level of each interval so that it covers at ``level`` after a search.
 
-    A search ends the missions of a setting after a look at their results, so an interval at the
-    plain level covers too seldom: the search stops where the results are extreme. After look k, the
-    interval has the error (1 - level) / (k (k + 1)). These errors add up to 1 - level over all
-    looks, so the interval covers at ``level``, whichever look was the last (the union bound).
+    A search ends the missions of a setting after an interim analysis of their results, so an
+    interval at the plain level covers too seldom: the search stops where the results are extreme.
+    After analysis k, the interval has the error (1 - level) / (k (k + 1)). These errors add up to
+    1 - level over all analyses, so the interval covers at ``level``, whichever analysis was the
+    last (the union bound).
 
     Args:
-        looks: (...) numbers of looks; 0 where the number of missions was fixed.
+        analyses: (...) numbers of interim analyses; 0 where the number of missions was fixed.
         level: The level after the search.
     """
-    return 1 - (1 - level) / np.maximum(looks * (looks + 1), 1)
+    return 1 - (1 - level) / np.maximum(analyses * (analyses + 1), 1)
 
 
 def skewness_of(squares: Any, cubes: Any, n: Any) -> Any:

@@ -22,7 +22,7 @@ class Points:
 
     Attributes:
         counts: (k,) missions that each needs so far.
-        looks: (k,) the number of rounds for which each had missions.
+        analyses: (k,) the number of rounds for which each had missions.
         verdicts: (k,) whether each meets the requirements: ``met``, ``missed`` or ``open``.
         promising: (k,) whether the means of its missions meet the requirements.
         costs: (k,) its mean cost.
@@ -30,7 +30,7 @@ class Points:
 
     def __init__(self, k: int, first: int):
         self.counts = np.full(k, first)
-        self.looks = np.ones(k, int)
+        self.analyses = np.ones(k, int)
         self.verdicts = np.full(k, Verdict.OPEN, object)
         self.promising = np.zeros(k, bool)
         self.costs = np.zeros(k)

@@ -270,7 +270,7 @@ class Cheapest(StrictTable):
         search = _Search(self, samples, settings)
         return CheapestChoice(
             counts=based_on(search.points.counts, samples),
-            looks=tuple(search.points.looks.tolist()),
+            analyses=tuple(search.points.analyses.tolist()),
             rounds=search.rounds,
             done=search.done,
             guarantee=self._guarantee(search),
@@ -430,7 +430,7 @@ class _Search:
     def _excess(self, candidates: np.ndarray, leader: int) -> np.ndarray:
         """How much more a candidate costs at most than each, by the missions that both have.
 
-        There is an error for every number of these missions, of which there are as many as looks.
+        There is an error for each number of these missions, of which there is one per analysis.
         """
         loss = np.mean([self.settings[p].loss for p in candidates[leader]])
         bounds = np.zeros(len(candidates))
@@ -439,8 +439,8 @@ class _Search:
                 continue
             both = [*candidate, *candidates[leader]]
             n = int(self.points.counts[both].min())
-            looks = int(self.points.looks[both].min())
-            error = self._error / (self._pairs * looks * (looks + 1))
+            analyses = int(self.points.analyses[both].min())
+            error = self._error / (self._pairs * analyses * (analyses + 1))
             costs, least = (
                 np.mean([self.samples[p]["cost"][:n] for p in point], axis=0)
                 for point in (candidate, candidates[leader])
@@ -468,7 +468,7 @@ class _Search:
                 self.done = True
                 return
             points.counts[needed] += steps
-            points.looks[needed] += 1
+            points.analyses[needed] += 1
             self.rounds += 1
 
     def _test(self, point: int) -> None:

@@ -204,7 +204,7 @@ class Costs(StrictTable):
     def price_of_uavs(self, space: ScenarioSpace, uavs: int) -> float:
         """What the first UAVs of a scenario and its spares cost.
 
-        The price of a type replaces ``uav``; a spare costs as much as the dearest UAV.
+        The price of a type replaces ``uav``; a spare costs as much as the most expensive UAV.
         """
         spares = space.data_sheet.spares
         if not has_priced_types(space):
@@ -381,7 +381,7 @@ def _prices_all_uavs(space: ScenarioSpace) -> bool:
 def most_battery_per_slot(space: ScenarioSpace) -> float:
     """The most that a slot in the air takes of a battery [%]."""
     energy = energy_constants(space.consumption, space.wind, space.size, slowest(space.fleet))
-    return float(space.flight_cost * energy["dearest_slot"] / PERCENT)
+    return float(space.flight_cost * energy["max_slot_cost"] / PERCENT)
 
 
 def spent_battery(

@@ -56,14 +56,15 @@ class Chosen:
 
     Attributes:
         counts: Number of missions per design point that the selection is based on.
-        looks: Number of rounds per design point after each of which it could have got no more.
+        analyses: Number of interim analyses per design point: of rounds after which it could have
+            got no more missions.
         rounds: Number of rounds of simulation.
         done: Whether the procedure needs no more missions.
         guarantee: What is guaranteed about the selection, in words.
     """
 
     counts: tuple[int, ...]
-    looks: tuple[int, ...]
+    analyses: tuple[int, ...]
     rounds: int
     done: bool
     guarantee: str
@@ -199,7 +200,7 @@ class Selection(StrictTable):
         race = _Race(self, self._values(samples))
         return Choice(
             counts=based_on(race.counts, samples),
-            looks=tuple(race.looks.tolist()),
+            analyses=tuple(race.analyses.tolist()),
             rounds=race.rounds,
             done=race.done,
             guarantee=self._guarantee(race),
@@ -272,7 +273,7 @@ class _Race:
         values: For each design point its values. Nothing is done before all points have the
             missions of the first round.
         counts: (k,) missions that each point needs so far.
-        looks: (k,) the number of rounds for which each had missions.
+        analyses: (k,) the number of rounds for which each had missions.
         alive: The points that are not ruled out, in order.
         stage: The last stage carried out.
         rounds: Number of rounds carried out.
@@ -285,7 +286,7 @@ class _Race:
         self.values = values
         self.is_bounded = rule.procedure == "kn-bounded"
         self.counts = np.full(len(values), rule.first)
-        self.looks = np.ones(len(values), int)
+        self.analyses = np.ones(len(values), int)
         self.alive = np.arange(len(values))
         self.stage = rule.first - 1
         self.rounds = 1
@@ -327,7 +328,7 @@ class _Race:
                 self.done = True
                 return
             self.counts[self.alive] += step
-            self.looks[self.alive] += 1
+            self.analyses[self.alive] += 1
             self.rounds += 1
 
     def _renew_margins(self, stage: int) -> None:

@@ -33,14 +33,14 @@ from dess.model.record import empty_records
 from dess.model.state import (
     MISSION,
     SENSOR,
+    peak_values,
     starts_of,
     state_of,
-    teeth_lengths,
     types_of,
 )
 from dess.model.view import check_team
 from dess.model.ways import Ways
-from dess.physics.fleet import legs, type_of
+from dess.physics.fleet import move_phases, type_of
 from dess.policies.choices import plan_circuit
 from dess.policies.integers import Integers
 from dess.policies.learner.policy import LearnedPolicy
@@ -50,7 +50,7 @@ from dess.scenario.scenario import ScenarioSpace
 # The arrays of which only the shape is in an image: what missions write, and what ``prepare``
 # fills. They begin with zeros, the records of ``operations`` with nan.
 EMPTY = {
-    *("missions", "uavs", "residual", "sensors", "teeth", "order", "means", "ways", "batches"),
+    *("missions", "uavs", "residual", "sensors", "peaks", "order", "means", "ways", "batches"),
     *("arrivals", "reach", "ways_home", "mission_records", "uav_records"),
     *("operations", "node_records", "values", "baseline", "totals", "sequences", "ends"),
     *("rates_by_distance", "sea_constants", "node_ways", "zone_ways", "home", "node_home"),
@@ -164,7 +164,7 @@ def explain_refusal(space: ScenarioSpace, team: Sequence[str]) -> str:
 def _memory_of_radio(space: ScenarioSpace) -> int:
     """The bytes of the tables ``order`` and ``means`` of ``World``, before they are made."""
     columns, rows = space.size
-    steps = 5 * columns * rows * legs(space.fleet)
+    steps = 5 * columns * rows * move_phases(space.fleet)
     return steps * len(space.nodes) * (2 + 8 * space.communication_slots)
 
 
@@ -202,10 +202,10 @@ def make_image(
     }
     everywhere = [space, *varied.values()]
     fleet = max(variant.uavs[1] for variant in everywhere)
-    teeth = teeth_lengths(everywhere)
+    peaks = peak_values(everywhere)
 
     def arrays_at(scenario: ScenarioSpace) -> dict[str, np.ndarray]:
-        return _arrays_of(scenario, team, seed, missions, fleet, teeth, costs)
+        return _arrays_of(scenario, team, seed, missions, fleet, peaks, costs)
 
     arrays = arrays_at(space)
     sliders = []
@@ -226,7 +226,7 @@ def _arrays_of(
     seed: int,
     missions: int,
     fleet: int,
-    teeth: int,
+    peaks: int,
     costs: Costs | None,
 ) -> dict[str, np.ndarray]:
     """All arrays by name, for fleets of at most that many UAVs."""
@@ -247,7 +247,7 @@ def _arrays_of(
         "uavs": types_of(space, fleet)[None],
         "residual": state.residual,
         "sensors": np.zeros(state.sensors.shape, SENSOR),
-        "teeth": np.zeros((1, teeth), np.int32),
+        "peaks": np.zeros((1, peaks), np.int32),
         "constants": _without_total(starts.constants.view(MISSION)),
         "ranges": starts.ranges,
         "types": types_of(space, fleet)[None],

@@ -36,7 +36,7 @@ ARRAYS: dict[str, tuple[Any, int]] = {
     "uavs": (UAV, 2),
     "residual": (_F8, 2),
     "sensors": (SENSOR, 2),
-    "teeth": (_I4, 2),
+    "peaks": (_I4, 2),
     "constants": (MISSION, 1),  # from here on those of ``Starts``
     "ranges": (_I8, 3),
     "types": (UAV, 2),
@@ -144,7 +144,7 @@ def state_in(table):
         array2(table, AT.uavs, _UAV),
         array2(table, AT.residual, _F8),
         array2(table, AT.sensors, _SENSOR),
-        array2(table, AT.teeth, _I4),
+        array2(table, AT.peaks, _I4),
     )
 
 

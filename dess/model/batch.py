@@ -23,7 +23,7 @@ from dess.model import rules
 from dess.model.campaign import Campaign, check_years
 from dess.model.channel import Site, empty_scratch, world_of
 from dess.model.record import Records, empty_records_of, write_record
-from dess.model.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
+from dess.model.state import check_seed, peak_values, spaces_of, starts_of, state_of
 from dess.model.view import decide, team_of
 from dess.model.ways import MOST_ENTRIES, Ways
 from dess.model.years import Years, most_places
@@ -134,7 +134,7 @@ def work_of(space: ScenarioSpace) -> int:
     """The most work of a slot of a mission: the loops of the engine, the guard and the policies."""
     nodes, fleet = len(space.nodes), space.uavs[1]
     work_of_uav = nodes * (nodes + space.communication_slots) + fleet * len(space.chart.parking)
-    return fleet * work_of_uav + teeth_lengths([space])
+    return fleet * work_of_uav + peak_values([space])
 
 
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:

@@ -307,7 +307,7 @@ class Campaign:
         mission.idle = gap
         mission.energy = b
         mission.slot_costs = costs.reshape(-1)
-        mission.dearest_slot = mission.waiting_slot = most
+        mission.max_slot_cost = mission.waiting_slot = most
         starts.ranges[b, 0] = len(self.flying)
         for i, uav in enumerate(self.flying):
             starts.uavs[b, i] = uav.state

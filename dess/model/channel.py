@@ -50,8 +50,8 @@ class Site(NamedTuple):
         nodes: The cells of the sensor nodes.
         cell_size: The side of a cell [m].
         communication_slots: The communication slots of a mission slot.
-        places, legs: What the speeds of the fleet ask for (``fleet.places_per_slot``,
-            ``fleet.legs``).
+        places, phases: What the speeds of the fleet ask for (``fleet.places_per_slot``,
+            ``fleet.move_phases``).
         link: The link budget.
     """
 
@@ -60,7 +60,7 @@ class Site(NamedTuple):
     cell_size: float
     communication_slots: int
     places: int
-    legs: int
+    phases: int
     link: Link
 
     @classmethod
@@ -72,7 +72,7 @@ class Site(NamedTuple):
             scenario.cell_size,
             scenario.communication_slots,
             fleet.places_per_slot(scenario.fleet),
-            fleet.legs(scenario.fleet),
+            fleet.move_phases(scenario.fleet),
             Link.of(scenario),
         )
 
@@ -92,8 +92,8 @@ class World(NamedTuple):
             m, or a multiple of it if a move may take several slots.
         order: (5 * W * H, K + 1) for each step on a grid of W x H cells, the nodes in descending
             order of their highest mean SNR in the slot; the last column tells whether the row is
-            filled. If a move may take several slots, there are such rows for each leg
-            (``fleet.leg``).
+            filled. If a move may take several slots, there are such rows for each phase
+            (``fleet.move_phase``).
         means: (5 * W * H, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
             communication slot; rows as in ``order``.
         chart: The zones, the no-fly cells and the ways between cells.
@@ -179,7 +179,7 @@ def make_world(site: Site) -> World:
     chart = chart_at(*site.geometry)
     m = site.communication_slots
     places = m * site.places
-    steps = 5 * chart.zones.size * site.legs
+    steps = 5 * chart.zones.size * site.phases
     longest = max(chart.zones.shape)
     fine = np.arange(places * (longest - 1) + 1)
     mean_snr = np.empty((longest, len(fine)))
@@ -242,8 +242,8 @@ def open_slot(mission, uavs, nodes, mean_snr, order, means, zones, search):
     for i in range(mission.uavs):
         u = uavs[i]
         if u.active:
-            leg = fleet.leg(u)
-            row = ((leg * 5 + u.executed) * rows + u.y) * columns + u.x
+            phase = fleet.move_phase(u)
+            row = ((phase * 5 + u.executed) * rows + u.y) * columns + u.x
             search[i, ROW] = row
             if order[row, mission.nodes] == 0:
                 _fill_row(u, row, nodes, mean_snr, order, means)

@@ -556,10 +556,10 @@ def _update_batteries(missions, uavs, nodes, mean_snr, order, means, zones, sear
 
 @kernel
 def _communicate(
-    missions, uavs, residual, sensors, teeth, order, means, batches, search, n
+    missions, uavs, residual, sensors, peaks, order, means, batches, search, n
 ):  # fmt: skip
     rules.communicate(
-        missions[0], uavs[0], residual[0], sensors[0], teeth[0],
+        missions[0], uavs[0], residual[0], sensors[0], peaks[0],
         order, means, batches, search, n,
     )  # fmt: skip
 

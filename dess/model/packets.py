@@ -23,7 +23,7 @@ import numpy as np
 
 from dess.base.kernels import kernel
 from dess.model.events import Listener
-from dess.physics.age import add_tooth, age_of_teeth
+from dess.physics.age import age_over_cycles, lower_age
 from dess.physics.arrivals import draw_arrival, factors_of, sources_of
 
 
@@ -131,13 +131,13 @@ class Buffers:
             out["latency"] = fmean(latency)
             out["latency_p99"] = np.quantile(latency, 0.99, method="inverted_cdf")
         if with_age:
-            lows, highs, peaks = teeth_of(done, len(self.queues), end)
-            out["age"], out["age_p99"] = age_of_teeth(lows, highs, np.ones(len(lows)))
+            lows, highs, peaks = age_cycles(done, len(self.queues), end)
+            out["age"], out["age_p99"] = age_over_cycles(lows, highs, np.ones(len(lows)))
             out["peak_age"] = fmean(highs[:peaks]) if peaks else math.nan
 
 
-def teeth_of(done: np.ndarray, nodes: int, end: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """The teeth of the ages of all nodes (``dess.physics.age``) from their deliveries.
+def age_cycles(done: np.ndarray, nodes: int, end: float) -> tuple[np.ndarray, np.ndarray, int]:
+    """The cycles of the ages of all nodes (``dess.physics.age``) from their deliveries.
 
     Args:
         done: (D,) ``PACKET`` records in the order of their delivery.
@@ -145,24 +145,25 @@ def teeth_of(done: np.ndarray, nodes: int, end: float) -> tuple[np.ndarray, np.n
         end: End of the mission [slots].
 
     Returns:
-        The (T,) ages at the beginnings and (T,) at the ends of the teeth [slots], and the number of
-        those that end with a delivery; they come first. Deliveries at the same time end one tooth.
+        The (T,) ages at the beginnings and (T,) at the ends of the cycles [slots], and the number
+        of those that end with a delivery; they come first. Deliveries at the same time end one
+        cycle.
     """
-    newest, since, teeth = [0.0] * nodes, [0.0] * nodes, []
+    newest, since, cycles = [0.0] * nodes, [0.0] * nodes, []
     for k, generated, left in done[["node", "generated", "left"]].tolist():
         if generated > newest[k]:
             if left > since[k]:
-                teeth.append((since[k] - newest[k], left - newest[k]))
+                cycles.append((since[k] - newest[k], left - newest[k]))
             newest[k], since[k] = generated, left
     last = [(since[k] - newest[k], end - newest[k]) for k in range(nodes)]
-    lows, highs = np.array([*teeth, *last]).T.copy()
-    return lows, highs, len(teeth)
+    lows, highs = np.array([*cycles, *last]).T.copy()
+    return lows, highs, len(cycles)
 
 
 @kernel
-def _add_tooth(missions, sensors, k, time, generated):
+def _deliver(missions, sensors, k, time, generated):
     newest = sensors[k].newest
-    add_tooth(missions[0], sensors[k], time - newest, time - generated)
+    lower_age(missions[0], sensors[k], time - newest, time - generated)
 
 
 class Packets:
@@ -247,7 +248,7 @@ class Packets:
         for number in b.delivered[before:]:
             sensor, generated = self._sensors[b.all[number].node], b.all[number].generated
             if generated > sensor["newest"]:
-                _add_tooth(self._missions, self._sensors, b.all[number].node, time, generated)
+                _deliver(self._missions, self._sensors, b.all[number].node, time, generated)
                 self._mission["newest"] += generated - sensor["newest"]
                 sensor["newest"] = generated
         self._tell("delivery", b.delivered[before:])

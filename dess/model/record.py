@@ -206,7 +206,7 @@ def write_record(state, b, ways, records, row):
     record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
     sensors = state.sensors[b]
-    _write_operations(mission, uavs, sensors, state.teeth[b], records.operations, row)
+    _write_operations(mission, uavs, sensors, state.peaks[b], records.operations, row)
     _write_nodes(mission, residual, sensors, records.nodes, row)
 
 
@@ -223,11 +223,11 @@ def _battery_home(mission, u, ways):
 
 
 @for_sections
-def _write_operations(mission, uavs, sensors, teeth, operations, row):
+def _write_operations(mission, uavs, sensors, peaks, operations, row):
     """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
     out = operations[row]
     if mission.age_measured != 0:
-        write_age(mission, sensors, teeth, out)
+        write_age(mission, sensors, peaks, out)
     if mission.has_charging:
         write_use(mission, uavs, out)
     if mission.has_failures:

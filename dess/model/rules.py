@@ -43,7 +43,7 @@ from dess.physics.landing import flies, has_finished, is_over, lands, next_latch
 from dess.physics.radio import is_below_steps
 from dess.physics.section import for_sections
 
-CRUMB = 1e-9  # a rest of data below this share of what a UAV has just collected is none
+ROUNDING = 1e-9  # a rest of data below this share of what a UAV has just collected is none
 
 
 @kernel
@@ -62,7 +62,7 @@ def launch(state, b, starts, number, replication):
     mission.replication = replication
     draw_parameters(mission, starts.ranges[number])
     mission.active = mission.uavs
-    state.teeth[b] = 0
+    state.peaks[b] = 0
     _launch_uavs(mission, starts.uavs[number], state.uavs[b])
     for k in range(mission.nodes):
         low, high = starts.data[number, k]
@@ -84,7 +84,7 @@ def _launch_idle_node(mission, sensor, residual, k, age_before):
     """Let the data of a node be what it has collected before the mission, and of that age.
 
     Where that is a Poisson number of messages, it is drawn in the place of its mean. Ages are
-    rounded to communication slots, since teeth are counted by them.
+    rounded to communication slots, since peaks are counted by them.
     """
     if mission.idle > 0.0:
         mean = sensor.rate * mission.idle
@@ -340,13 +340,13 @@ def _spend_in_the_air(mission, u):
 
 @inlined
 def communicate(
-    mission, uavs, residual, sensors, teeth, order, means, batches, search, n
+    mission, uavs, residual, sensors, peaks, order, means, batches, search, n
 ):  # fmt: skip
     """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
     among those with residual data, the lowest index on a tie, unless this SNR is below the lowest
-    step of the rate. ``served`` and ``amount`` of each UAV are set. The arguments after ``teeth``
+    step of the rate. ``served`` and ``amount`` of each UAV are set. The arguments after ``peaks``
     are arrays of ``World`` and ``Scratch``; ``channel.open_slot`` must have begun the mission slot.
     """
     for i in range(mission.uavs):
@@ -360,12 +360,12 @@ def communicate(
         if node < 0 or is_below_steps(mission, snr):
             continue
         amount = min(channel.rate(mission, snr) * u.rate, residual[node])
-        if _leaves_crumb(mission, residual[node], amount):
+        if _leaves_rounding(mission, residual[node], amount):
             amount = residual[node]
         residual[node] -= amount
         _count_collected(mission, sensors[node], amount)
         if residual[node] == 0.0:
-            age.empty(mission, sensors[node], teeth, n)
+            age.empty(mission, sensors[node], peaks, n)
         u.served = node
         u.amount = amount
         u.snr = snr
@@ -380,19 +380,19 @@ def _count_collected(mission, sensor, amount):
 
 
 @for_sections
-def _leaves_crumb(mission, data, amount):
+def _leaves_rounding(mission, data, amount):
     """Whether what an amount leaves of the data is due to rounding, as three times 0.3 does of 0.9.
 
     This happens where rates have steps or a largest value. Without sections it has no chance.
     """
-    return data - amount < CRUMB * amount
+    return data - amount < ROUNDING * amount
 
 
 @kernel
-def _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search):
+def _communicate_all(mission, uavs, residual, sensors, peaks, order, means, batches, search):
     """Run all communication slots. Within ``run_slot``, registers would be short."""
     for n in range(1, mission.communication_slots + 1):
-        communicate(mission, uavs, residual, sensors, teeth, order, means, batches, search, n)
+        communicate(mission, uavs, residual, sensors, peaks, order, means, batches, search, n)
 
 
 @kernel
@@ -524,7 +524,7 @@ def run_slot(state, b, world, scratch):
     """
     # The functions that are not inlined take few arrays: each costs time.
     mission, uavs, residual = state.missions[b], state.uavs[b], state.residual[b]
-    sensors, teeth = state.sensors[b], state.teeth[b]
+    sensors, peaks = state.sensors[b], state.peaks[b]
     nodes, mean_snr, order, means, chart = world
     batches, search, _ = scratch
     if advance_without_uavs(mission, uavs, residual, sensors, scratch):
@@ -533,7 +533,7 @@ def run_slot(state, b, world, scratch):
     grant_pads(mission, uavs)
     spend(mission, uavs)
     channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart.zones, search)
-    _communicate_all(mission, uavs, residual, sensors, teeth, order, means, batches, search)
+    _communicate_all(mission, uavs, residual, sensors, peaks, order, means, batches, search)
     arrive(mission, residual, sensors, scratch)
     settle(mission, uavs)
     strike_if_on(mission, uavs, residual, sensors, LOST)

@@ -80,7 +80,7 @@ MISSION = np.dtype(
         # counts for a slot of waiting.
         ("has_costs", np.int64),
         ("slot_costs", np.int16, SPEEDS * ACTIONS),
-        ("dearest_slot", np.int64),
+        ("max_slot_cost", np.int64),
         ("waiting_slot", np.int64),
         ("energy", np.int64),  # which of the energies of a batch it is
         # What the mean wind takes of the four moves and its deviation from cell to cell [% of
@@ -191,7 +191,7 @@ class State(NamedTuple):
         uavs: (B, I) ``UAV`` records.
         residual: (B, K) residual data [data units].
         sensors: (B, K) ``SENSOR`` or ``PLAIN_SENSOR`` records.
-        teeth: (B, G) where ages are measured, the number of their teeth by length in communication
+        peaks: (B, G) where ages are measured, the number of their peaks by age in communication
             slots (``dess.physics.age``); otherwise (B, 0).
     """
 
@@ -199,7 +199,7 @@ class State(NamedTuple):
     uavs: np.ndarray
     residual: np.ndarray
     sensors: np.ndarray
-    teeth: np.ndarray
+    peaks: np.ndarray
 
 
 def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
@@ -212,12 +212,12 @@ def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
         np.zeros((missions, fleet), UAV),
         np.zeros((missions, nodes)),
         np.zeros((missions, nodes), sensor),
-        np.zeros((missions, teeth_lengths(spaces)), np.int32),
+        np.zeros((missions, peak_values(spaces)), np.int32),
     )
 
 
-def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
-    """How many lengths the teeth of ages can have in missions of these scenarios."""
+def peak_values(spaces: Iterable[ScenarioSpace]) -> int:
+    """How many values the peaks of ages can have in missions of these scenarios."""
     measured = (s for s in spaces if s.age.measured and not s.needs_events)
     return max((_longest_age(s) + 1 for s in measured), default=0)
 

@@ -136,7 +136,7 @@ def energy_constants(
     return {
         "has_costs": consumption.is_on or wind.blows,
         "slot_costs": costs.reshape(-1),
-        "dearest_slot": most_expensive,
+        "max_slot_cost": most_expensive,
         # In wind a UAV that waits hovers; where hovering may cost the most, any slot may.
         "waiting_slot": most_expensive if consumption.is_on else PERCENT,
         **_gust_constants(wind),
@@ -205,14 +205,14 @@ def has_costs(mission):
 
 
 @inlined
-def dearest_slot(mission):
+def max_slot_cost(mission):
     """The most that a slot takes [% / 1000]."""
     return PERCENT + _more_at_most(mission)
 
 
 @for_sections
 def _more_at_most(mission):
-    return mission.dearest_slot - PERCENT
+    return mission.max_slot_cost - PERCENT
 
 
 @inlined

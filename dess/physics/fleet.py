@@ -94,10 +94,10 @@ def slowest(fleet: Fleet) -> int:
     return max((kind.slots_per_cell for kind in fleet), default=1)
 
 
-def legs(fleet: Fleet) -> int:
-    """The number of different legs: the mission slots of a move, for each speed up to the slowest.
+def move_phases(fleet: Fleet) -> int:
+    """The number of phases of moves: their mission slots, for each speed up to the slowest.
 
-    A move that takes s slots has s legs (``leg``).
+    A move that takes s slots has s phases (``move_phase``).
     """
     return slowest(fleet) * (slowest(fleet) + 1) // 2
 
@@ -108,8 +108,8 @@ def places_per_slot(fleet: Fleet) -> int:
 
 
 @inlined
-def leg(u):
-    """The number of a UAV's leg in the present slot, from 0 on; the only one of s = 1 is 0."""
+def move_phase(u):
+    """The phase of a UAV's move in the present slot, from 0 on; the only one of s = 1 is 0."""
     s = u.slots_per_cell
     return s * (s - 1) // 2 + s - 1 - u.slots_left
 

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dess.base.errors import InputError, listed, shown
-from dess.physics.age import MOST_TEETH
+from dess.physics.age import MOST_AGES
 from dess.physics.arrivals import MOST as MOST_RATE
 from dess.physics.arrivals import MOST_AMOUNT, MOST_MESSAGES
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
 from dess.physics.energy import MOST as MOST_COST
 from dess.physics.energy import PERCENT
 from dess.physics.failures import MOST_PADS
-from dess.physics.fleet import IN_UNITS, legs, places_per_slot, slowest
+from dess.physics.fleet import IN_UNITS, move_phases, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
 from dess.scenario.places import Projection
@@ -110,7 +110,7 @@ def _titles(
 
 def _too_large(c: Fields) -> Iterator[InputError]:
     """The tables of a mission fit into memory."""
-    ways = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet))
+    ways = max(5 * len(c.nodes) * move_phases(c.fleet), places_per_slot(c.fleet))
     columns, rows = c.size
     if columns * rows * c.communication_slots * ways > MOST_ENTRIES:
         yield InputError(
@@ -127,12 +127,12 @@ def _too_large(c: Fields) -> Iterator[InputError]:
             f"the {columns} x {rows} grid is too large",
             f"at most {most:,} nodes and cells of zones on so many cells",
         )
-    has_teeth = c.age.measured and not c.needs_events
-    if has_teeth and (c.max_slots + c.idle_slots) * c.communication_slots > MOST_TEETH:
+    counts_peaks = c.age.measured and not c.needs_events
+    if counts_peaks and (c.max_slots + c.idle_slots) * c.communication_slots > MOST_AGES:
         yield InputError(
             "age.measured",
             "the mission has too many communication slots",
-            f"max_slots * communication_slots <= {MOST_TEETH}, with the slots of idle",
+            f"max_slots * communication_slots <= {MOST_AGES}, with the slots of idle",
         )
     if c.idle_slots and c.needs_events:
         yield InputError("data_sheet.idle", "needs slotted arrivals", "without it, or slotted")

@@ -327,7 +327,7 @@ def _check_state(state: State, space: ScenarioSpace) -> None:
         (missions, {"uavs": (1, fleet), "slot": (0, slots)}),
         (uavs, of_uavs | truths),
         (uavs[is_there], dict.fromkeys(cells, (0, edge))),
-        # Ages are indices of teeth.
+        # Ages are indices of peaks.
         (state.sensors, {"newest": (-ceil(space.idle_slots), missions["slot"][:, None])}),
     ]
     for records, ranges in allowed:

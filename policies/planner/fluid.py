@@ -24,14 +24,14 @@ from dess.physics.charging import charge_limit, gain
 from dess.physics.chart import distance, in_zone, is_open
 from dess.physics.energy import (
     PERCENT,
-    dearest_slot,
     has_costs,
+    max_slot_cost,
     slot_cost_at,
     thousandths_left,
     waiting_slot,
 )
 from dess.physics.failures import working_pads
-from dess.physics.fleet import leg
+from dess.physics.fleet import move_phase
 from dess.physics.landing import has_finished, lands, next_latch
 from dess.physics.radio import has_limit
 from dess.physics.section import for_sections
@@ -64,7 +64,7 @@ NODE = np.dtype([("base", np.float64), ("since", np.int64)])
 STRIDE, MOST_SLOTS, MOST_SLOTS_LANDING = 8, 2048, 240
 
 # An emptied node has data again when so much is expected to have arrived [data units]. If it had
-# some at once, UAVs would serve crumbs instead of the data of other nodes.
+# some at once, UAVs would serve tiny amounts instead of the data of other nodes.
 _HALF_A_PACKET = 0.5
 # A communication slot in which no node has data counts toward the quota if at least so many data
 # units arrive per slot: then some node far away is likely to have got some.
@@ -331,7 +331,7 @@ def _collect_data(mission, rates, sea, v, t, wait, data_left):
     """Let a UAV serve one node after another for a slot, and return what it collects."""
     candidates = rates.candidates
     rows, columns = rates.chart.zones.shape
-    row = ((leg(v) * 5 + v.action) * rows + v.y) * columns + v.x
+    row = ((move_phase(v) * 5 + v.action) * rows + v.y) * columns + v.x
     rate = mission.arrival_rate
     left = mission.communication_slots
     collected = 0.0
@@ -497,7 +497,7 @@ def _must_return(mission, rates, v, t, active):
     kept = v.slots_per_cell + 2 + _slots_for_detours(mission, v, active)
     if has_costs(mission):
         spent = _battery_to_cell(mission, rates.chart, v, home[0], home[1])
-        spent += mission.flight_cost * kept * dearest_slot(mission)
+        spent += mission.flight_cost * kept * max_slot_cost(mission)
         return way + kept > left or spent > v.battery
     if mission.flight_cost > 0:
         left = min(left, _percent_left(mission, v))

@@ -82,13 +82,13 @@ def _rank_nodes(
     rates = _mean_rate(snr.reshape(longest, -1), constants)
     kept = min(_RANKS, len(cells))
     slowest = int(constants["slowest"])
-    legs = slowest * (slowest + 1) // 2
+    phases = slowest * (slowest + 1) // 2
     check_memory(
         f"planner: a grid of {columns:,} x {rows:,} cells",
-        5 * legs * columns * rows * kept * CANDIDATE.itemsize,
+        5 * phases * columns * rows * kept * CANDIDATE.itemsize,
         "a smaller grid, or fewer nodes or slots per cell",
     )
-    table = np.empty((legs, 5, rows, columns, kept), CANDIDATE)
+    table = np.empty((phases, 5, rows, columns, kept), CANDIDATE)
     parts = (rates.shape[1] - 1) // (longest - 1)
     for s in range(1, slowest + 1):
         part = parts // (m * s) if parts % (m * s) == 0 else 0

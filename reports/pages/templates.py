@@ -25,11 +25,11 @@ _COMMON = ("engine", "panel_numbers", "panel_controls", "panel_view")
 # The scripts of pages, each with the templates that it is made of.
 _SCRIPTS = {
     PANEL_SCRIPT: (
-        *("player", *_COMMON, "panel_commands", "panel_series", "panel_crew"),
+        *("player", *_COMMON, "panel_commands", "panel_series", "panel_pool"),
         *("sha256", "replay", "panel_runs", "panel_grid", "panel"),
     ),
     SINGLE_SCRIPT: (*_COMMON, "panel_commands", "sha256", "replay", "another"),
-    EXAMPLE_SCRIPT: (*_COMMON, "panel_series", "panel_crew", "try"),
+    EXAMPLE_SCRIPT: (*_COMMON, "panel_series", "panel_pool", "try"),
     "worker": ("engine", "panel_worker"),
 }
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging

@@ -12,8 +12,8 @@ const required = [...root.querySelectorAll("[data-panel=requirement]")].map((lin
 /** @type {(key: string) => Metric | undefined} */
 const metricOf = (key) => data.metrics.find((metric) => metric.key === key);
 
-/** @type {Crew} */
-let crew;
+/** @type {WorkerPool} */
+let pool;
 /** @type {Runs} */
 let runs;
 /** @type {Comparison<Run> | null} */
@@ -64,12 +64,12 @@ function present(tracks, target) {
     find("mission").hidden = true;
     comparison = new Comparison(tracks, target);
     [shownKey, shownCommand] = [chosenKey(), chosenCommand()];
-    crew.begin(comparison);
+    pool.begin(comparison);
     show();
 }
 
 function stop() {
-    crew.end();
+    pool.end();
     show();
 }
 
@@ -82,8 +82,8 @@ function schedule() {
 }
 
 function show(why = "") {
-    find("run").disabled = crew.isDoing(comparison);
-    find("stop").disabled = !crew.isDoing(comparison);
+    find("run").disabled = pool.isDoing(comparison);
+    find("stop").disabled = !pool.isDoing(comparison);
     if (data.grid) showGrid();
     controlsA.show();
     controlsB.show(controlsA.positions);
@@ -142,19 +142,19 @@ function fill() {
         const heads = find("grid").tHead.rows[0].cells;
         const cells = choices.map(({place, choice}) => {
             const name = `${heads[place.cellIndex].textContent}, ${place.parentElement.cells[0].textContent}`;
-            return {name, place, track: new Track(crew.simulator, name, choice, prices.amounts, error), wanted: rule.first};
+            return {name, place, track: new Track(pool.simulator, name, choice, prices.amounts, error), wanted: rule.first};
         });
         grid = new Grid(cells, required, metricOf("cost"), rule);
         gridKey = keyOfGrid();
     }
     grid.requirements = requirements();
     grid.resume();
-    crew.begin(grid);
+    pool.begin(grid);
     show();
 }
 
 function showGrid() {
-    const isRunning = crew.isDoing(grid), isNew = keyOfGrid() !== gridKey, isAsked = requirements().length > 0;
+    const isRunning = pool.isDoing(grid), isNew = keyOfGrid() !== gridKey, isAsked = requirements().length > 0;
     find("fill").disabled = isRunning || !isAsked;
     find("fill-stop").disabled = !isRunning;
     find("fill-csv").disabled = grid === null || isNew;
@@ -215,7 +215,7 @@ function stateInWords() {
     const whose = tracks.length > 1 ? "missions of A and of B" : "missions of A (B is the same)";
     if (!target) return `${grouped(count)} ${whose}, which were simulated before.`;
     const text = `${grouped(count)} of ${grouped(target)} ${whose}`;
-    if (crew.isDoing(comparison)) return `${text}, running.`;
+    if (pool.isDoing(comparison)) return `${text}, running.`;
     if (!comparison.isComplete) return `${text}, stopped.`;
     return `${text}, in ${seconds.toFixed(1)} s.`;
 }
@@ -297,7 +297,7 @@ function showMission(row) {
     find("mission").hidden = false;
     find("mission-text").textContent = `Mission ${row}: the product is ${a} in A and ${b} in B. `;
     playMissions(find("players"), Object.fromEntries(tracks.map(({choice}, n) =>
-        [`panel-player-${SIDES[n]}`, {engine: engineOf(crew.simulator, choice), title: `Mission ${row} of ${NAMES[n]}`}])), row);
+        [`panel-player-${SIDES[n]}`, {engine: engineOf(pool.simulator, choice), title: `Mission ${row} of ${NAMES[n]}`}])), row);
     find("mission-command").textContent = tracks.map(({choice}) => simulateCommand(data, choice, row)).join("\n");
 }
 
@@ -353,7 +353,7 @@ function reset() {
 find("choices").open = !matchMedia(NARROW).matches;
 
 openPanel((simulator) => {
-    crew = new Crew(simulator, (why) => why ? show(why) : schedule());
+    pool = new WorkerPool(simulator, (why) => why ? show(why) : schedule());
     runs = new Runs(simulator, choose);
     const isAsked = readAddress();
     document.querySelectorAll("[data-to=panel]").forEach((/** @type {any} */ link) => { link.hidden = false; });

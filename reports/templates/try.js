@@ -4,29 +4,29 @@
 "use strict";
 const MISSIONS = 1000; // of each side
 const controls = new Controls(root, "b", data.settings);
-/** @type {Crew} */
-let crew;
+/** @type {WorkerPool} */
+let pool;
 /** @type {Comparison | null} */
 let comparison = null;
 
 /** @type {(name: string, positions: number[]) => Track} */
-const trackOf = (name, positions) => new Track(crew.simulator, name, {positions, policy: data.policy});
+const trackOf = (name, positions) => new Track(pool.simulator, name, {positions, policy: data.policy});
 
 function start() {
     comparison = new Comparison([trackOf("a", data.start.a), trackOf("b", controls.positions)], MISSIONS);
-    crew.begin(comparison);
+    pool.begin(comparison);
     find("results").hidden = false;
     show();
 }
 
 function stop() {
-    crew.end();
+    pool.end();
     show();
 }
 
 function show(why = "") {
     controls.show();
-    const isRunning = crew.isDoing(comparison);
+    const isRunning = pool.isDoing(comparison);
     find("stop").disabled = !isRunning;
     if (!comparison) return;
     const isStale = comparison.tracks[1].choice.positions.join() !== controls.positions.join();
@@ -37,7 +37,7 @@ function show(why = "") {
 }
 
 openPanel((simulator) => {
-    crew = new Crew(simulator, show);
+    pool = new WorkerPool(simulator, show);
     root.addEventListener("input", stop);
     find("run").addEventListener("click", start);
     find("stop").addEventListener("click", stop);

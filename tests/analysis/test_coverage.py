@@ -185,9 +185,9 @@ def test_intervals_cover_after_a_search_has_decided_how_many_missions_there_are(
         costs = generator.normal(1000.0 * np.arange(len(shares)), 300.0, (6000, len(shares))).T
         samples = [{"success": s, "cost": c} for s, c in zip(success, costs, strict=True)]
         choice = rule.choice(samples, settings)
-        for point, (n, looks) in enumerate(zip(choice.counts, choice.looks, strict=True)):
+        for point, (n, analyses) in enumerate(zip(choice.counts, choice.analyses, strict=True)):
             _, low, high = share_interval(
-                int(success[point][:n].sum()), n, float(level_after(looks))
+                int(success[point][:n].sum()), n, float(level_after(analyses))
             )
             covers[trial, point] = low <= shares[point] <= high
     assert (covers.mean(axis=0) >= 0.95 - max(0.02, error(trials) / 2)).all()

@@ -78,9 +78,9 @@ def compare_with_baseline(
             wide = by_replication(missions, metric, "point")
             measure = metric_in_groups(missions, metric, ["point"], wide.columns.to_frame())
             others = wide.drop(columns=point)
-            looks = results.looks(str(policy))
+            analyses = results.analyses(str(policy))
             # The pairs end with the missions of the one that has fewer.
-            seen = np.minimum(looks[others.columns.to_numpy()], looks[point])
+            seen = np.minimum(analyses[others.columns.to_numpy()], analyses[point])
             is_other = wide.columns != point
             ranges = (
                 measure.at(is_other),

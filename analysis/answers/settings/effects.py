@@ -156,8 +156,8 @@ def _average_labelled(
     missions = missions[missions["cell"] >= 0]
     tables = []
     for name, part in missions.groupby("policy", sort=False):
-        looks = results.looks(str(name))
-        seen = np.array([looks[cell_of == cell].min() for cell in range(len(cells))])
+        analyses = results.analyses(str(name))
+        seen = np.array([analyses[cell_of == cell].min() for cell in range(len(cells))])
         units = part.groupby(["cell", "replication"])[metric].agg(["mean", "size"])
         if not sampled:  # only replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]

@@ -197,7 +197,7 @@ def ends_in_words(results: Results, point: int, ends: Mapping[str, str]) -> str:
 
 def intervals_in_words(results: Results) -> str:
     """What the intervals of the means of a study's settings are called."""
-    is_search = any(results.looks(policy).any() for policy in results.policies)
+    is_search = any(results.analyses(policy).any() for policy in results.policies)
     if is_search:
         return f"{INTERVALS} that allow for the search"
     return INTERVALS

@@ -192,11 +192,11 @@ def rank_settings(
     """
     check_ranking_metric(metric, results.missions)
     missions = results.missions_of(policy)
-    looks = {name: results.looks(name) for name in missions["policy"].unique()}
+    analyses = {name: results.analyses(name) for name in missions["policy"].unique()}
     cell = ["policy", "point"]
     table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
     table = table.join(values_of_points(results), on="point")
-    seen = np.array([looks[row.policy][row.point] for row in table.itertuples()])
+    seen = np.array([analyses[row.policy][row.point] for row in table.itertuples()])
     others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
         wide = by_replication(missions, name, cell)

@@ -3,8 +3,8 @@
 The guard counts batteries in thousandths of a percent (``dess.physics.energy``). Where slots take
 anything else than one percent each, the battery is no time any more, so that both must last: the
 battery for the cheapest way home, and the slots that are left for the shortest one. A slot of
-waiting counts as ``waiting_slot``; a slot of a margin counts half of the dearest way forth and
-back, since a detour is one.
+waiting counts as ``waiting_slot``; a slot of a margin counts half of the most that a way forth and
+back takes, since a detour is one.
 """
 
 import math
@@ -14,8 +14,8 @@ from dess.model.state import EAST, HOVER, NORTH, SOUTH, WEST
 from dess.physics.charging import own_limit
 from dess.physics.energy import (
     PERCENT,
-    dearest_slot,
     has_costs,
+    max_slot_cost,
     slot_cost,
     thousandths_left,
     waiting_slot,
@@ -113,7 +113,7 @@ def must_charge(mission, u, data):
         return False
     # A UAV that lives until the mission is truncated is not lost.
     needed = min(needed, mission.max_slots - mission.slot + 1)
-    return thousandths_left(u) < mission.flight_cost * dearest_slot(mission) * needed
+    return thousandths_left(u) < mission.flight_cost * max_slot_cost(mission) * needed
 
 
 @inlined
@@ -195,7 +195,7 @@ def _slot_of_detour(mission, u):
     if not has_costs(mission):
         return PERCENT
     if mission.gusts > 0.0:  # the gusts of two cells are hardly ever both the strongest
-        return (PERCENT + dearest_slot(mission) + 1) // 2
+        return (PERCENT + max_slot_cost(mission) + 1) // 2
     slots = u.slots_per_cell
     across = slot_cost(mission, slots, NORTH) + slot_cost(mission, slots, SOUTH)
     along = slot_cost(mission, slots, EAST) + slot_cost(mission, slots, WEST)

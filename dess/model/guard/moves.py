@@ -56,7 +56,14 @@ from dess.model.view import View
 from dess.model.ways import is_calm
 from dess.physics.charging import longest_charge
 from dess.physics.chart import distance, in_zone, is_open
-from dess.physics.energy import PERCENT, dearest_slot, has_costs, move_cost, slot_cost, waiting_slot
+from dess.physics.energy import (
+    PERCENT,
+    has_costs,
+    max_slot_cost,
+    move_cost,
+    slot_cost,
+    waiting_slot,
+)
 from dess.physics.landing import lands
 
 _MOST_BATTERY = 2**40  # more than any way costs
@@ -422,7 +429,7 @@ def _wait(mission, u, chart, action, x, y, home, reach):
         return 0
     battery = (home.begins - arrives) * waiting_slot(mission)
     if has_costs(mission):
-        battery += 2 * dearest_slot(mission)
+        battery += 2 * max_slot_cost(mission)
     return battery
 
 

@@ -31,7 +31,7 @@ from dess.model.guard.ways import battery_of_way, is_tight
 from dess.model.state import HOVER
 from dess.physics.charging import charge_limit, is_before, slots_to_charge
 from dess.physics.chart import distance
-from dess.physics.energy import PERCENT, dearest_slot, slot_cost, thousandths_left, waiting_slot
+from dess.physics.energy import PERCENT, max_slot_cost, slot_cost, thousandths_left, waiting_slot
 from dess.physics.failures import working_pads
 from dess.physics.landing import lands
 from dess.physics.section import for_sections
@@ -237,7 +237,7 @@ def find_ways(mission, u, turn, chart, reach):
         zone = np.int64(chart.zones[y, x])
         cells = distance(chart, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
-        spent += u.slots_left * dearest_slot(mission)
+        spent += u.slots_left * max_slot_cost(mission)
         slots = cells * u.slots_per_cell + u.slots_left
         least = turn.spent[zone]
         if least < 0 or spent < least or (spent == least and slots < turn.way[zone]):

@@ -8,7 +8,7 @@ from dess.model.state import EAST, NORTH, SOUTH, WEST
 from dess.model.ways import is_calm
 from dess.physics.charging import charge_limit, longest_charge
 from dess.physics.chart import cost_around, distance, length_around
-from dess.physics.energy import PERCENT, dearest_slot, has_costs, slot_cost, waiting_slot
+from dess.physics.energy import PERCENT, has_costs, max_slot_cost, slot_cost, waiting_slot
 from dess.physics.landing import lands
 
 # Zone cells per UAV below which the UAVs count on the cells that teammates will take to be closed.
@@ -195,12 +195,12 @@ def battery_of_way(mission, u, chart, x, y, home_x, home_y, cells, reach):
     """The battery for a way home of so many cells, those of a detour included [% / 1000]."""
     if reach is None or len(reach) == 0:
         return PERCENT * cells
-    dearest = u.slots_per_cell * dearest_slot(mission)
+    max_cost = u.slots_per_cell * max_slot_cost(mission)
     if reach.size == 0:  # too many cells for a table
-        return cells * dearest
+        return cells * max_cost
     detour = cells - distance(chart, x, y, home_x, home_y)
     home = chart.nearest[home_y, home_x]
-    return reach[mission.energy, home, u.slots_per_cell - 1, y, x] + detour * dearest
+    return reach[mission.energy, home, u.slots_per_cell - 1, y, x] + detour * max_cost
 
 
 @inlined
@@ -250,7 +250,7 @@ def battery_of_flight(mission, slots, east, south, cells):
     """
     along_x = slot_cost(mission, slots, EAST if east > 0 else WEST)
     along_y = slot_cost(mission, slots, SOUTH if south > 0 else NORTH)
-    detour = (cells - abs(east) - abs(south)) * dearest_slot(mission)
+    detour = (cells - abs(east) - abs(south)) * max_slot_cost(mission)
     return slots * (abs(east) * along_x + abs(south) * along_y + detour)
 
 

@@ -106,7 +106,7 @@ def stub(**policies):
         for name, values in policies.items()
     ]
     results = SimpleNamespace(
-        missions=pd.concat(tables, ignore_index=True), looks=lambda policy: np.zeros(1, int)
+        missions=pd.concat(tables, ignore_index=True), analyses=lambda policy: np.zeros(1, int)
     )
     rows = [(name, 0, PRODUCT, np.mean(values), 0.0, 1.0) for name, values in policies.items()]
     return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low", "high"])
@@ -132,7 +132,7 @@ def test_what_is_neither_better_nor_worse_ranks_nothing(metric):
     spread = np.linspace(0.3, 0.8, 30)
     results, means = stub(a=spread + 0.2, b=spread)
     missions = results.missions.rename(columns={PRODUCT: metric})
-    results = SimpleNamespace(missions=missions, looks=results.looks)
+    results = SimpleNamespace(missions=missions, analyses=results.analyses)
     means = means.assign(metric=metric)
     assert summary.add_verdicts(results, means)["verdict"].tolist() == [ONLY] * 2
     missions = {

@@ -57,8 +57,8 @@ def test_after_a_search_the_tests_have_the_errors_of_their_looks():
     """PointStyle k of a setting has the share 1 / (k (k + 1)) of the error of each pair."""
     values = np.random.default_rng(4).normal(size=(15, 8)) + np.linspace(0, 1.5, 8)
     later = np.full(8, 2)
-    assert may_be_best(values, looks=later).tolist() == by_hand(values, 1 - 0.05 / 6).tolist()
-    assert may_be_best(values, looks=later).sum() > may_be_best(values).sum()
+    assert may_be_best(values, analyses=later).tolist() == by_hand(values, 1 - 0.05 / 6).tolist()
+    assert may_be_best(values, analyses=later).sum() > may_be_best(values).sum()
 
 
 def test_blocks_of_settings_are_judged_like_all_at_once(monkeypatch):

@@ -192,7 +192,7 @@ def test_a_cost_is_bounded_as_the_method_says():
     samples, settings = noisy([1.0, 1.0, 1.0], [50e3, 49e3, 48e3], missions=40)
     settings = [setting._replace(loss=7e4) for setting in settings]
     search = _Search(rule(), samples, settings)
-    search.points.counts[:], search.points.looks[:] = [40, 30, 20], [3, 2, 1]
+    search.points.counts[:], search.points.analyses[:] = [40, 30, 20], [3, 2, 1]
     excess = search._excess(np.array([[0], [1], [2]]), 1)
     assert excess[1] == 0.0
     for other, n, look in ((0, 30, 2), (2, 20, 1)):

@@ -186,7 +186,14 @@ def test_a_mission_of_a_space_is_the_mission_of_its_drawn_scenario(space, seed, 
     assert one.metrics["uavs"] == drawn.uavs == len(one.uavs)
 
 
-FATE = ("mission_start", "arrival", "node_failure", "node_repair", "pad_failure", "pad_repair")
+RANDOM_EVENTS = (
+    "mission_start",
+    "arrival",
+    "node_failure",
+    "node_repair",
+    "pad_failure",
+    "pad_repair",
+)
 
 
 @given(spaces(arrival_rate=0.3) | extended_spaces() | continuous_spaces(), seeds, replications)
@@ -196,8 +203,8 @@ def test_two_policies_have_common_random_numbers(space, seed, replication):
     until, kept = min(record.slots for record in records), []
     for record in records:
         assert record.events is not None
-        rows = [row for row in record.events if row.event in FATE and row.time < until]
-        held = [0.0 if row.event in FATE[2:4] else row.value for row in rows]
+        rows = [row for row in record.events if row.event in RANDOM_EVENTS and row.time < until]
+        held = [0.0 if row.event in RANDOM_EVENTS[2:4] else row.value for row in rows]
         places = [(row.time, row.event, row.uav, row.node, row.x, row.y) for row in rows]
         kept.append([*zip(places, held, strict=True)])
     assert kept[0] == kept[1]

@@ -16,7 +16,7 @@ from dess.model.state import BATTERY, QUOTA, TRUNCATED
 from tests.dess.model.flights import CHANNEL, Case, check
 
 HAND = CHANNEL | {"charge_start": 11, "charge_complete": 25, "uavs": 1, "zone": [0, 0, 1, 1]}
-BESIDE = HAND | {"nodes": [[1, 0]], "initial_data": 50.0}
+ADJACENT_NODE = HAND | {"nodes": [[1, 0]], "initial_data": 50.0}
 # Two UAVs that start in a zone of two cells, far from a node that is never emptied.
 PAIR = HAND | {"uavs": 2, "zone": [0, 0, 2, 1], "nodes": [[3, 3]], "initial_data": 1000.0}
 ONE_NODE = PAIR | {"nodes": [[0, 0]], "quota": 1, "flying_time": 20}
@@ -35,7 +35,7 @@ def _emptied() -> Case:
     for the quota, and the battery of 5 is empty after slot 4.
     Reward: 1.3 * 19.5 - 5 * 0.1 - 300 = -275.15.
     """
-    fields = BESIDE | {"initial_data": 19.5, "quota": 4, "flying_time": 5}
+    fields = ADJACENT_NODE | {"initial_data": 19.5, "quota": 4, "flying_time": 5}
     expected = {
         "communication time x value": [(1, 1, 8), (2, 2, 4), (3, 1, 7.5)],
         "battery_empty time uav value": [(5, 0, 0)],
@@ -59,7 +59,11 @@ def _two_nodes() -> Case:
              n = 2: nothing is left.
     Reward: 1.3 * 12 - 3 * 0.1 + 100 = 115.3. Battery: 20 - 3.
     """
-    fields = BESIDE | {"communication_slots": 2, "nodes": [[1, 0], [3, 0]], "initial_data": 6.0}
+    fields = ADJACENT_NODE | {
+        "communication_slots": 2,
+        "nodes": [[1, 0], [3, 0]],
+        "initial_data": 6.0,
+    }
     first, second = _bits(1 / 4) / 2, _bits(9 / 4) / 2
     served = [(0.5, 0, first), (1, 0, 6 - first), (1.5, 1, second), (2, 1, 2)]
     expected = {
@@ -91,7 +95,7 @@ def _charge_stop() -> Case:
         "record collection_ratio": [20 / 50],
         "uavs slots_flying slots_charging slots_waiting": [(5, 2, 0)],
     }
-    return Case(BESIDE | {"quota": 5, "flying_time": 12}, ("",), expected)
+    return Case(ADJACENT_NODE | {"quota": 5, "flying_time": 12}, ("",), expected)
 
 
 def _index_order(starts: list[tuple[int, int]], amounts: list[float]) -> Case:
@@ -182,7 +186,7 @@ def _last_slot() -> Case:
         "uavs quota battery end": [(2, 0, QUOTA)],
         "record success slots reward": [1, 2, 1.3 * 12 - 0.2 + 100],
     }
-    return Case(BESIDE | {"quota": 2, "flying_time": 2}, ("EE",), expected)
+    return Case(ADJACENT_NODE | {"quota": 2, "flying_time": 2}, ("EE",), expected)
 
 
 def _no_decrease(quota: int, end: int, slots: int, collected: float, reward: float) -> Case:
@@ -197,7 +201,7 @@ def _no_decrease(quota: int, end: int, slots: int, collected: float, reward: flo
         "record collected reward": [collected, reward],
     }
     fields = {"quota": quota, "flying_time": 2, "flight_cost": 0, "max_slots": 6}
-    return Case(BESIDE | fields, ("EEW",), expected)
+    return Case(ADJACENT_NODE | fields, ("EEW",), expected)
 
 
 def _who_has_ended() -> Case:

@@ -12,7 +12,7 @@ from dess import InputError
 from dess.base.files.reading import parse_toml
 from dess.model.state import check_seed, sample_scenario, spaces_of
 from dess.physics import streams
-from dess.physics.age import MOST_TEETH
+from dess.physics.age import MOST_AGES
 from dess.physics.chart import spread
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import (
@@ -85,7 +85,11 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"flying_time": [0, 5]}, "[0, 5] is out of range", "1..100"),
     ({"charge_start": 60}, "60 is not below charge_complete 60", "eq. 1"),
     ({"grid": 256, "nodes": [[0, 0]], "fleet": SPEEDS, "communication_slots": 64}, "", "<= 1"),
-    ({"max_slots": MOST_TEETH // 4 + 1, "age.measured": True}, "too many", f"<= {MOST_TEETH}"),
+    (
+        {"max_slots": MOST_AGES // 4 + 1, "age.measured": True},
+        "too many",
+        f"<= {MOST_AGES}",
+    ),
     ({"arrivals": {"buffer": 3}}, "slotted arrivals have no", "continuous"),
     ({"arrivals": {"process": "continuous", "rates": [0.1]}}, "there are 1", "25"),
     ({"arrivals": {"process": "continuous", "schedule": [[3, 1], [3, 2]]}}, "slot 3 comes", ""),
@@ -106,7 +110,7 @@ def test_bad_values_are_refused_in_one_line(values, problem, allowed):
 
 
 def test_what_just_fits_is_allowed():
-    load_scenario("paper", max_slots=MOST_TEETH // 4, **{"age.measured": True})
+    load_scenario("paper", max_slots=MOST_AGES // 4, **{"age.measured": True})
     load_scenario("paper", zone=[0, 0, 13, 5], pads=64, **FAILING)
 
 

@@ -72,7 +72,7 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
     assert measured == "6 missions that check it, under the worst condition for each metric"
     for (policy, point), row in found.iterrows():
         missions = searched.missions.query("policy == @policy and point == @point")
-        level = float(level_after(searched.looks(policy)[point]))
+        level = float(level_after(searched.analyses(policy)[point]))
         assert level > 0.95
         _, *ends = share_interval(int(missions["success"].sum()), len(missions), level)
         assert [row["success_low"], row["success_high"]] == pytest.approx(ends)
@@ -80,14 +80,14 @@ def test_an_answer_quotes_the_check_and_a_table_allows_for_the_search(searched):
 
 def test_differences_from_a_baseline_allow_for_the_search(searched):
     """Two settings are compared on the missions of both, at the error of their last look."""
-    looks = searched.looks("greedy")
+    analyses = searched.analyses("greedy")
     missions = searched.missions.query("policy == 'greedy'")
     wide = missions.pivot(index="replication", columns="point", values="success")
     for row in (
         compare_with_baseline(searched, 0, ["success"]).query("policy == 'greedy'").itertuples()
     ):
         both = wide[[row.point, 0]].dropna().to_numpy(float)
-        level = float(level_after(min(looks[row.point], looks[0])))
+        level = float(level_after(min(analyses[row.point], analyses[0])))
         expected = compare_pairs(*both.T, level, "success")
         assert (row.low, row.high) == pytest.approx((expected.low, expected.high))
         assert row.p >= expected.p

@@ -75,25 +75,25 @@ class Packets:
 
 
 class Ages:
-    """The ages of all nodes, and the teeth of their saws: the ages at their beginnings and ends."""
+    """The ages of all nodes, and their cycles: the ages at their beginnings and ends."""
 
     def __init__(self, ages: list[float]):
         """Begin with the ages of the nodes."""
         nodes = len(ages)
         self.newest, self.fell = [-age for age in ages], [0.0] * nodes
-        self.teeth: list[tuple[float, float]] = []
+        self.cycles: list[tuple[float, float]] = []
         self.areas = [0.0] * nodes
 
     def fall(self, node: int, time: float, generated: float) -> None:
         """Data of a node that were generated at that time have been collected."""
         if generated > self.newest[node]:
             if time > self.fell[node]:
-                self._add_tooth(node, time)
+                self._add_cycle(node, time)
             self.newest[node], self.fell[node] = generated, time
 
-    def _add_tooth(self, node: int, time: float) -> None:
+    def _add_cycle(self, node: int, time: float) -> None:
         low, high = self.fell[node] - self.newest[node], time - self.newest[node]
-        self.teeth.append((low, high))
+        self.cycles.append((low, high))
         self.areas[node] += (high - low) * (high + low) / 2
 
     def mean_at(self, time: float) -> float:
@@ -101,23 +101,23 @@ class Ages:
         return time - sum(self.newest) / len(self.newest)
 
     def finish(self, end: float) -> None:
-        """Add the last tooth of every node."""
+        """Add the last cycle of every node."""
         for node in range(len(self.newest)):
-            self._add_tooth(node, end)
+            self._add_cycle(node, end)
 
     def metrics(self) -> dict[str, float]:
         """What the record has of the ages of a mission that has ended (``finish``)."""
-        peaks = [high for _, high in self.teeth[: -len(self.newest)]]
-        whole = sum(high - low for low, high in self.teeth)
-        area = sum((high**2 - low**2) / 2 for low, high in self.teeth)
+        peaks = [high for _, high in self.cycles[: -len(self.newest)]]
+        whole = sum(high - low for low, high in self.cycles)
+        area = sum((high**2 - low**2) / 2 for low, high in self.cycles)
         found = {"age": area / whole, "age_p99": self._exceeded_for(0.01 * whole)}
         return found | ({"peak_age": sum(peaks) / len(peaks)} if peaks else {})
 
     def _exceeded_for(self, spent: float) -> float:
         """The age that is exceeded for that time, by bisection."""
-        low, high = 0.0, max(high for _, high in self.teeth)
+        low, high = 0.0, max(high for _, high in self.cycles)
         for _ in range(60):
             age = (low + high) / 2
-            above = sum(max(end - max(begin, age), 0.0) for begin, end in self.teeth)
+            above = sum(max(end - max(begin, age), 0.0) for begin, end in self.cycles)
             low, high = (age, high) if above > spent else (low, age)
         return (low + high) / 2

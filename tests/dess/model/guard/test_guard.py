@@ -100,7 +100,7 @@ OVERRULED = {"overruled": True, "overruled_by": 2}
 NORTHERN, SOUTHERN = ({"x": 20 + k, "y": 10 + k, "battery": 29, "latch": True} for k in (0, 1))
 # A UAV that hovers in a zone with one pad, and one that the way to its goal leads past.
 CHARGED: dict[str, Any] = {"x": 27, "y": 3, "battery": 50, "executed": HOVER}
-BESIDE = {"x": 27, "y": 5, "battery": 60, "overruled": True, "overruled_by": 0}
+PASSING = {"x": 27, "y": 5, "battery": 60, "overruled": True, "overruled_by": 0}
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_a_uav_makes_room_for_one_that_must_charge(i, uavs, moves):
 def test_a_uav_whose_move_was_overruled_does_not_wait_in_its_zone():
     """It will try again, so the cells beside it are not left to its teammate."""
     for overruled in (False, True):
-        mask = _mask(CHARGED | {"overruled": overruled}, BESIDE, pads=1)
+        mask = _mask(CHARGED | {"overruled": overruled}, PASSING, pads=1)
         assert mask[1, NORTH] == (not overruled)
 
 

@@ -33,7 +33,7 @@
 const MOST_WORKERS = 8;
 
 // The workers, which do one job at a time.
-class Crew {
+class WorkerPool {
     /**
      * @param {Simulator} simulator
      * @param {(why?: string) => void} changed - called after each answer, and with the reason when a worker dies
