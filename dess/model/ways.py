@@ -155,11 +155,13 @@ class WaysOfPlaces:
         speeds = slowest
         if cells * slowest * size > MOST_ENTRIES:
             speeds = 0
-        self.reach = np.zeros((places, cells, speeds, *chart.zones.shape), np.int32)
-        self.home = np.zeros((places, slowest, *chart.zones.shape), np.int32)
+        self._reach = np.zeros((places, cells, speeds, *chart.zones.shape), np.int32)
+        self._home = np.zeros((places, slowest, *chart.zones.shape), np.int32)
+        # Of the types that those of ``Ways`` have, so that functions are compiled once for both.
+        self.reach, self.home = read_only(self._reach[:]), read_only(self._home[:])
 
     def fill(self, b: int, missions: np.ndarray) -> None:
         """Compute the tables of place ``b`` for the energy of its mission, of (1,) records."""
         energy = part_of(missions, ENERGY_PART).tobytes()
-        for table, groups in ((self.reach, self.reach.shape[1]), (self.home[:, None], 1)):
+        for table, groups in ((self._reach, self.reach.shape[1]), (self._home[:, None], 1)):
             table[b] = _filled(*self._sea, groups, self._slowest, energy)
