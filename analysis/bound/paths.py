@@ -154,7 +154,7 @@ def blocks_of(nodes: np.ndarray, size: tuple[int, int], most: int, levels: np.nd
         np.add.at(borders, (neighbour, cell), 1)
     np.fill_diagonal(borders, 0)
     most = min(most, max(int((borders > 0).sum(axis=1).max()), 1))
-    near = np.argsort(-borders, axis=1, kind="stable")[:, :most]
+    near = np.argsort(-borders, axis=1, kind="stable")[:, :most].copy()  # as all arrays, in C order
     near[np.take_along_axis(borders, near, axis=1) == 0] = -1
     place = np.full(borders.shape, -1)
     for node, row in enumerate(near):
