@@ -191,27 +191,22 @@ def is_found(name: str, module: str) -> bool:
 
 
 @pytest.mark.parametrize("module", LIBRARY)
-def test_a_name_in_prose_is_one_of_the_code(module):
+def test_what_docstrings_name_is_in_the_code(module):
     """A local name of a function may be named in its own docstring only if it is an argument."""
-    unknown = {
+    texts = [*docstrings(SOURCES[module])]
+    in_prose = {
         name
-        for node, text in docstrings(SOURCES[module])
+        for node, text in texts
         for name in {*NAME.findall(text)} - all_names() - arguments_of(node)
         if not name.endswith(ENDS)
     }
-    assert not unknown
-
-
-@pytest.mark.parametrize("module", LIBRARY)
-def test_what_is_said_to_return_rows_is_there(module):
-    found = [pair for _, text in docstrings(SOURCES[module]) for pair in MADE.findall(text)]
-    assert not {first or second for first, second in found} - made_names()
-
-
-@pytest.mark.parametrize("module", LIBRARY)
-def test_examples_call_what_there_is(module):
-    called = {name for _, text in docstrings(SOURCES[module]) for name in calls_in(text)}
+    assert not in_prose
+    made = [pair for _, text in texts for pair in MADE.findall(text)]
+    assert not {first or second for first, second in made} - made_names()
+    called = {name for _, text in texts for name in calls_in(text)}
     assert not called - made_names() - foreign() - {*dir(builtins)} - OTHERS
+    gone = sorted({name for name in quoted(SOURCES[module]) if not is_found(name, module)})
+    assert not gone
 
 
 EXAMPLES = [m for m, tree in LIBRARY.items() if any(">>> " in t for _, t in docstrings(tree))]
@@ -230,12 +225,6 @@ def test_stale_examples_are_found():
     assert [*calls_in("Some prose.\n\n    value = improve(mission, 3)\n")] == ["improve"]
     assert MADE.findall("Rows of ``transfers``, as ``stacked`` returns them")
     assert not {"transfers", "stacked", "improve"} & made_names()
-
-
-@pytest.mark.parametrize("module", LIBRARY)
-def test_docstrings_name_what_there_is(module):
-    gone = sorted({name for name in quoted(SOURCES[module]) if not is_found(name, module)})
-    assert not gone
 
 
 def test_a_name_that_is_gone_is_found():

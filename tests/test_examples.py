@@ -25,9 +25,10 @@ def study(example):
 
 
 def test_the_search_is_reproducible(example, study):
-    again = example["search"](trials=10, seed=3)
-    assert [t.params for t in again.trials] == [t.params for t in study.trials]
-    assert again.best_trial.intermediate_values == study.best_trial.intermediate_values
+    again = example["search"](trials=4, seed=3)
+    for trial, first in zip(again.trials, study.trials, strict=False):
+        assert trial.params == first.params
+        assert trial.intermediate_values == first.intermediate_values
 
 
 def test_designs_that_lose_on_the_same_replications_are_given_up(example, study):
