@@ -243,7 +243,7 @@ def test_the_best_learned_policy_is_judged(tmp_path):
 
 def test_a_short_training_of_the_papers_network_cannot_tell(tmp_path):
     """Its failures say nothing of the paper's learner, and its length is a departure."""
-    study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=20)
+    study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=40)
     judged = scorecard({"table4": run_study(study, tmp_path / "table4")}, NONE)
     of_table = [row.findings[1] for row in judged if row.claim.study == "table4"]
     assert {finding.verdict for finding in of_table} == {INCONCLUSIVE}

@@ -17,7 +17,8 @@ def titles_of(report):
     return {line.removeprefix("## ") for line in lines if line.startswith("## ")}
 
 
-def test_the_page_of_a_search_has_the_calendar_the_years_and_what_decides(tmp_path):
+def test_the_page_of_a_search_has_the_calendar_the_years_and_what_decides(tmp_path, monkeypatch):
+    monkeypatch.setattr(around, "YEARS", 1)
     scenario = write_years(tmp_path, calm=CALM_MONTHS)
     question = sweep_question(
         {"uavs": (2,)},
