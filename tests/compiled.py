@@ -6,7 +6,7 @@ from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import empty_scratch
 from dess.model.guard import battery, matching, moves, parking, queues, ways
-from dess.model.state import SENSOR, STEP_X, STEP_Y
+from dess.model.state import MISSION, SENSOR, STEP_X, STEP_Y
 from dess.model.ways import Ways
 from dess.physics import chart
 from dess.physics.chart import FAR, distance, is_open
@@ -70,15 +70,21 @@ def cost_around(mission, zones, least, closed, start, end, limit):
     return chart.cost_around(zones, mission, 1, table, 0, costs, *start, *end, limit)
 
 
+def _with_sections(mission, chart):
+    """A mission as one that has sections, and its table: functions are compiled for that alone."""
+    missions = np.array([mission]).view(MISSION)
+    return missions[0], Ways(missions, chart).reach
+
+
 def parking_cell(mission, uavs, i, chart, data=1e6):
-    reach = Ways(np.array([mission]), chart).reach
+    mission, reach = _with_sections(mission, chart)
     memory = parking.parking_memory(chart, len(uavs))
     return _parking_cell(mission, uavs, i, data, chart, memory, reach)
 
 
 def planned_cells(mission, uavs, i, chart, data=1e6):
     """The cells that teammates choose before UAV ``i`` in its plan; None where one chooses none."""
-    reach = Ways(np.array([mission]), chart).reach
+    mission, reach = _with_sections(mission, chart)
     memory = parking.parking_memory(chart, len(uavs))
     _parking_cell(mission, uavs, i, data, chart, memory, reach)
     return [tuple(chart.parking[number]) if number >= 0 else None for number in memory.planned]
@@ -91,7 +97,7 @@ def _parking_cell(mission, uavs, i, data, chart, memory, reach):
 
 def plan_of_pads(mission, uavs, i, chart, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
-    reach = Ways(np.array([mission]), chart).reach
+    mission, reach = _with_sections(mission, chart)
     plan = queues.plan_memory(len(uavs))
     return plan, _plan_pads(mission, uavs, i, data, chart, plan, reach)
 
