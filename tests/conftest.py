@@ -37,10 +37,11 @@ QUICK = (
 # seldom both compile the same.
 COMPILING = ("reports/cli/study/test_diff.py", "analysis/bound/test_optimum.py")
 COMPILING += ("reports/cli/test_evaluate.py",)
-# Between them some that compile little, until what the next ones need of others is compiled, and
-# the process that has compiled the guard for the engine takes the planner, which has the guard too.
-COMPILING += ("policies/learner/test_session.py", "analysis/execution", "analysis/test_coverage.py")
-COMPILING += ("reports/pages/test_render.py", "policies/planner/test_policy.py")
+# The planner has the guard, so the process that compiles the engine should take it: a worker gets
+# its next file when two tests of the present one are left, and the other one is sooner there.
+COMPILING += ("policies/learner/test_session.py", "policies/planner/test_policy.py")
+# Some that compile little, until what the last ones need of others is compiled.
+COMPILING += ("analysis/execution", "analysis/test_coverage.py", "reports/pages/test_render.py")
 COMPILING += ("policies/learner/test_policy.py", "dess/envs/observations/test_states.py")
 # Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")

@@ -6,10 +6,9 @@ from itertools import islice, product
 import numpy as np
 import pytest
 
-from dess import load_scenario, simulate_batch
+from dess import load_scenario
 from dess.analysis.bound import upper_bound
 from dess.base.errors import InputError
-from dess.policies import load
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.bound.tiny_sea import TinySea, bound_of_data, check, contraction, gap_of
 
@@ -258,18 +257,3 @@ def test_a_uav_that_flies_around_no_fly_cells_is_bounded_exactly():
     (straight, _), (best, bound) = (both(**trip, no_fly=cells) for cells in ((), ((2, 0),)))
     assert bound == pytest.approx(best)
     assert bound < 0.9 * straight
-
-
-# --- by simulation, last, as the engine is compiled in another process by then ---
-
-
-def test_the_optimum_is_reached_where_hovering_is_best():
-    """Every replication is the same mission, but for the shadowing."""
-    space = shadowed(
-        nodes=((1, 1), (0, 1)), edge_snr=0.0, shadowing_variance=100.0, initial_data=1000.0,
-        arrival_rate=0.0,
-    )  # fmt: skip
-    ratios = simulate_batch(space, load("greedy"), 3, 4000).missions["collection_ratio"]
-    best = TinySea(space, 3, contraction(12)).optimum
-    assert ratios.mean() == pytest.approx(best, abs=4 * ratios.std() / len(ratios) ** 0.5)
-    assert best <= upper_bound(space, 3, 0).ratio <= 1.01 * best

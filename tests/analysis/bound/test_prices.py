@@ -10,6 +10,7 @@ from dess.analysis.bound import upper_bound
 from dess.analysis.bound.prices import Bounds, Detail, ceilings_memory, known_of
 from dess.base.errors import InputError
 from dess.scenario.scenario import ScenarioSpace
+from tests.analysis.bound.tiny_sea import TinySea, contraction
 
 TINY = {"grid": 6, "nodes": ((1, 1), (4, 2), (2, 5)), "zone": (2, 1, 2, 2), "max_slots": 60}
 
@@ -36,6 +37,20 @@ def test_no_policy_has_a_higher_mean_on_a_tiny_sea(variance):
     sea = {"quota": 40, "initial_data": (200.0, 300.0), "shadowing_variance": variance}
     space = tiny(uavs=(1, 4), **sea, **battery)
     check_means(space, ["random", "nearest", "greedy", "tour", "planner"], 20)
+
+
+def test_the_optimum_is_reached_where_hovering_is_best():
+    """A lone UAV that need not charge; all replications are one mission, but for the shadowing."""
+    sea = {"grid": 3, "zone": (1, 1, 1, 1), "nodes": ((1, 1), (0, 1)), "uavs": 1, "quota": 3}
+    battery = {"flying_time": 40, "charge_start": 10, "charge_complete": 50}
+    link = {"communication_slots": 1, "edge_snr": 0.0, "shadowing_variance": 100.0}
+    data = {"initial_data": 1000.0, "arrival_rate": 0.0, "max_slots": 3}
+    space = load_scenario("paper", **sea | battery | link | data)
+    missions = simulate_batch(space, policies.load("greedy"), 3, 4000).missions
+    ratios = missions["collection_ratio"]
+    best = TinySea(space, 3, contraction(12)).optimum
+    assert ratios.mean() == pytest.approx(best, abs=4 * ratios.std() / len(ratios) ** 0.5)
+    assert best <= upper_bound(space, 3, 0).ratio <= 1.01 * best
 
 
 @pytest.mark.slow
