@@ -147,13 +147,20 @@ def ask_questions(
         meaning, default = questions[asked[0]]
         answer = ""
         if sys.stdin.isatty():
-            answer = input(f"{name}: {meaning}? ").strip()
+            answer = input(f"{name}: {meaning}{_use_of_enter(default)}? ").strip()
         try:
             check(name, answer or default or "")
             answered[asked.pop(0)] = answer or default or ""
         except InputError as error:
             print_text(error, sys.stderr)
     return answered
+
+
+def _use_of_enter(default: str | None) -> str:
+    """What an empty answer to a question means, if one is allowed."""
+    if default is None:
+        return ""
+    return f" (Enter: {default or 'without'})"
 
 
 @contextmanager
@@ -215,9 +222,14 @@ def print_list(entries: Iterable[tuple[str, str]]) -> None:
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
     """Print a table; its first columns are aligned to the left, the others to the right.
 
-    A table that is wider than ``WIDTH`` goes on below, with its first column again.
+    A table that is wider than ``WIDTH`` goes on below, with its first column again, or with its
+    first two where it takes both to tell the rows apart.
     """
     lines = [[*map(printable, line)] for line in (header, *rows)]
+    names = {line[0] for line in lines}
+    keys = 1
+    if len(names) < len({tuple(line[:2]) for line in lines}) == len(lines):
+        keys = 2
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     aligns = [str.ljust if number < left else str.rjust for number in range(len(header))]
     aligned = [
@@ -225,7 +237,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         for line in lines
     ]
     aligned.insert(1, ["─" * width for width in widths])
-    for columns in _group_columns(widths):
+    for columns in _group_columns(widths, keys):
         shown = ("  ".join(line[number] for number in columns).rstrip() for line in aligned)
         print("", *shown, "", sep="\n")
     if any("nan" in cell for line in lines for cell in line):
@@ -234,13 +246,13 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         print("".join(f" {why}\n" for why in [why_nan(sum(lines, []))] if why), end="")
 
 
-def _group_columns(widths: Sequence[int]) -> Iterator[list[int]]:
-    """The numbers of the columns that are printed side by side; the first one is in all."""
-    block = [0]
-    for number in range(1, len(widths)):
-        if len(block) > 1 and sum(widths[n] + 2 for n in (*block, number)) > WIDTH + 2:
+def _group_columns(widths: Sequence[int], keys: int) -> Iterator[list[int]]:
+    """The numbers of the columns that are printed side by side; the first ones are in all."""
+    block = [*range(keys)]
+    for number in range(keys, len(widths)):
+        if len(block) > keys and sum(widths[n] + 2 for n in (*block, number)) > WIDTH + 2:
             yield block
-            block = [0]
+            block = [*range(keys)]
         block.append(number)
     yield block
 

@@ -46,6 +46,19 @@ def test_a_bar_says_that_something_is_compiled():
         assert progress.desc == "round 2: "
 
 
+@pytest.mark.parametrize(
+    ("policies", "keys"), [(["a", "b"], ["fleet", "policy"]), (["a", "a"], ["fleet"])]
+)
+def test_a_wide_table_goes_on_with_what_tells_its_rows_apart(capsys, policies, keys):
+    fleets = ["1 UAV", "1 UAV"]
+    if keys == ["fleet"]:
+        fleets = ["1 UAV", "2 UAVs"]
+    rows = [[*row, "x" * 60, "y" * 60] for row in zip(fleets, policies, strict=True)]
+    console.print_table(["fleet", "policy", "wide", "wider"], rows)
+    heads = [line.split() for line in capsys.readouterr().out.splitlines() if "fleet" in line]
+    assert heads == [["fleet", "policy", "wide"], [*keys, "wider"]]
+
+
 def is_printable(text: str) -> bool:
     return all(line.isprintable() for line in text.split("\n"))
 
