@@ -210,7 +210,7 @@ def _empty_parts(nodes, mates, zones):
 
 
 @inlined
-def _round_inputs(values, scales, out):
+def round_inputs(values, scales, out):
     """Write float32 inputs as integers."""
     most = np.float32(MOST)
     for c in range(len(values)):
@@ -227,7 +227,7 @@ def _round_factors(values, out):
 
 
 @inlined
-def _list_pairs(a, b, listed):
+def list_pairs(a, b, listed):
     """List the pairs that are not zero in one of two rows; return how many."""
     count = 0
     for number in range(len(a)):
@@ -261,7 +261,7 @@ def _set_function(number: int) -> Any:
         sums = memory.sums
         base(sums, memory.own, weights[context:], biases[context_bias:], every, OWN // 2, 0, 0)
         for n in range(members):
-            _round_inputs(lines[n], scales[scales_at:], of_set.lines[n])
+            round_inputs(lines[n], scales[scales_at:], of_set.lines[n])
         for n in range(0, members, ROWS):
             first(
                 of_set.first, of_set.lines[n:], weights[inputs:], sums, every, columns // 2,
@@ -303,7 +303,7 @@ def _value(row, integers, memory):
     """The value of an action, of which the first hidden layer is in a row of the memory."""
     weights, biases, shifts, _ = integers
     numbers = memory.hidden[row].view(np.int32)
-    count = _list_pairs(numbers, numbers, memory.listed)
+    count = list_pairs(numbers, numbers, memory.listed)
     _to_last(
         memory.last, memory.hidden[row], weights[_W.hidden :], biases[_B.hidden :], memory.listed,
         count, shifts[_S.hidden], 0,
@@ -324,9 +324,9 @@ def _best_action(parts, mask, integers, memory):
     """
     weights, biases, shifts, scales = integers
     listed = memory.listed
-    _round_inputs(parts.own, scales[_C.own :], memory.own)
+    round_inputs(parts.own, scales[_C.own :], memory.own)
     for action in range(ACTIONS):
-        _round_inputs(parts.actions[action], scales[_C.action :], memory.actions[action])
+        round_inputs(parts.actions[action], scales[_C.action :], memory.actions[action])
     for c in range(OWN):
         memory.state[c] = memory.own[c]
     for move in range(HOVER):
@@ -336,13 +336,13 @@ def _best_action(parts, mask, integers, memory):
     _pool_mates(parts.mates, parts.mate_moves, integers, memory.mates, memory)
     _pool_zones(parts.zones, parts.zone_moves, integers, memory.zones, memory)
     numbers = memory.state.view(np.int32)
-    count = _list_pairs(numbers, numbers, listed)
+    count = list_pairs(numbers, numbers, listed)
     _to_joint(
         memory.joint, memory.state, weights[_W.own :], biases[_B.own :], listed, count,
         shifts[_S.own], 0,
     )  # fmt: skip
     numbers = memory.joint.view(np.int32)
-    count = _list_pairs(numbers, numbers, listed)
+    count = list_pairs(numbers, numbers, listed)
     _to_joint(
         memory.sums, memory.joint, weights[_W.state :], biases[_B.state :], listed, count, 0, 0
     )
@@ -354,7 +354,7 @@ def _best_action(parts, mask, integers, memory):
         if mask >> first & 3 == 0:
             continue
         moves = memory.moves[first:]
-        count = _list_pairs(moves[0].view(np.int32), moves[1].view(np.int32), listed)
+        count = list_pairs(moves[0].view(np.int32), moves[1].view(np.int32), listed)
         _to_joint_of_two(
             memory.hidden, moves, weights[_W.moves :], memory.sums, listed, count, shift, 0
         )

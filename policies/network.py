@@ -64,8 +64,8 @@ class PaperNetwork:
             [_read_convolution(weights, f"{name}.{number}", dtype) for number in (0, 2)]
             for name in ("local", "far")
         ]
-        self._hidden = _read_dense_layers(weights, dtype)
-        self._values = _cast_layer(dtype, *_read_layer(weights, "values"))
+        self._hidden = [_cast_layer(dtype, *layer) for layer in read_hidden_layers(weights)]
+        self._values = _cast_layer(dtype, *read_layer(weights, "values"))
 
     def __call__(self, local: np.ndarray, far: np.ndarray, own: np.ndarray) -> np.ndarray:
         """The values (R, 5) of the actions, from the arrays of ``Maps.encode``."""
@@ -89,8 +89,8 @@ class DuelingNetwork:
 
     def __init__(self, weights: Weights, dtype: Any) -> None:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
-        self._hidden = _read_dense_layers(weights, dtype)
-        ends = zip(_read_layer(weights, "value"), _read_layer(weights, "advantage"), strict=True)
+        self._hidden = [_cast_layer(dtype, *layer) for layer in read_hidden_layers(weights)]
+        ends = zip(read_layer(weights, "value"), read_layer(weights, "advantage"), strict=True)
         self._values = _cast_layer(dtype, *(v + a - a.mean(-1, keepdims=True) for v, a in ends))
 
     def __call__(self, vector: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ class SetNetwork:
         """Make it of weights for computing in ``dtype``, float32 or float64."""
 
         def layer(name: str) -> Layer:
-            return _cast_layer(dtype, *_read_layer(weights, name))
+            return _cast_layer(dtype, *read_layer(weights, name))
 
         def of_sets(*names: str) -> list[np.ndarray]:
             return [layer(f"sets.{number}.{name}")[0] for number in SETS for name in names]
@@ -181,19 +181,17 @@ def _dense_layer_sizes(widths: Sequence[int]) -> Sizes:
     return {f"hidden.{2 * number}": (outputs, inputs) for number, (inputs, outputs) in pairs}
 
 
-def _read_layer(weights: Weights, name: str) -> Layer:
+def read_layer(weights: Weights, name: str) -> Layer:
     """A linear layer in double precision; one without a bias has zeros."""
     matrix = weights[f"{name}.weight"].T.astype(np.float64)
     bias = weights.get(f"{name}.bias", np.zeros(matrix.shape[1]))
     return matrix, bias.astype(np.float64)
 
 
-def _read_dense_layers(weights: Weights, dtype: Any) -> list[Layer]:
-    """The dense layers, each of which is followed by a ReLU."""
+def read_hidden_layers(weights: Weights) -> list[Layer]:
+    """The dense layers in double precision, each of which is followed by a ReLU."""
     count = sum(name.startswith("hidden.") for name in weights) // 2
-    return [
-        _cast_layer(dtype, *_read_layer(weights, f"hidden.{2 * number}")) for number in range(count)
-    ]
+    return [read_layer(weights, f"hidden.{2 * number}") for number in range(count)]
 
 
 def _read_convolution(weights: Weights, name: str, dtype: Any) -> Layer:

@@ -1,4 +1,4 @@
-"""From the float weights of a network of sets to integers, with scales from observations.
+"""From the float weights of a network to integers, with scales from observations.
 
 A ReLU and the highest of some products stay the same if a channel is multiplied by a positive
 number. So each channel has a scale of its own, by which the weights that read it are divided; a
@@ -10,14 +10,16 @@ largest possible sum allows.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from dess.base.vectors import MOST
 from dess.model.state import HOVER
+from dess.policies.dense import BLOCK, VALUES, filled_widths
 from dess.policies.integers import LAYERS, SCALES, SETS, SHIFTED, Integers
-from dess.policies.network import ACTIONS, Weights
+from dess.policies.network import ACTIONS, Layer, Weights, read_hidden_layers, read_layer
 
 ROOM = 1.5  # by which values may exceed the largest observed ones
 ROWS = 64  # observations that are computed together
@@ -27,7 +29,6 @@ _NUMBERS = range(len(SETS))
 _HALF = 0.5
 
 Observation = tuple[np.ndarray, ...]  # arrays of ``Sets.encode``
-Matrix = tuple[np.ndarray, np.ndarray]  # (inputs, outputs) and the bias
 
 
 class Activations(NamedTuple):
@@ -43,7 +44,7 @@ class Activations(NamedTuple):
 
 
 def quantize(weights: Weights, observations: Sequence[Observation]) -> Integers:
-    """The integers of a network.
+    """The integers of a network of sets.
 
     Args:
         weights: The weights of ``SetNetwork``, with the widths ``integers.HIDDEN``.
@@ -51,15 +52,33 @@ def quantize(weights: Weights, observations: Sequence[Observation]) -> Integers:
     """
     ordered = order_channels(weights, trace(weights, observations).zeros)
     peaks = trace(ordered, observations).peaks
-    return _Quantization(ordered, peaks).integers()
+    return _quantize_sets(_Quantization(layers_of(ordered), peaks))
 
 
-def layers_of(weights: Weights) -> dict[str, Matrix]:
-    """The layers of a network in double precision; those that act on the same sums are one."""
+def quantize_dense(weights: Weights, observations: Sequence[Observation]) -> Integers:
+    """The integers of a dense network.
 
-    def layer(name: str) -> Matrix:
-        matrix = weights[f"{name}.weight"].T.astype(np.float64)
-        return matrix, weights.get(f"{name}.bias", np.zeros(matrix.shape[1])).astype(np.float64)
+    Args:
+        weights: The weights of ``DuelingNetwork``.
+        observations: As for ``quantize``.
+    """
+    hidden = read_hidden_layers(weights)
+    matrix, bias = read_layer(weights, "advantage")
+    # What all actions share decides nothing.
+    values = matrix - matrix.mean(1, keepdims=True), bias - bias.mean()
+    seen = np.concatenate([vectors for (vectors,) in observations]).astype(np.float64)
+    # A column may be a cell or a case that no observation had: it is 1 there.
+    peaks = {"inputs": np.abs(seen).max(0, initial=1)}
+    for number, (matrix, bias) in enumerate(hidden):
+        seen = np.maximum(seen @ matrix + bias, 0)
+        peaks[f"{number}"] = seen.max(0)
+    layers = {f"{number}": layer for number, layer in enumerate(hidden)}
+    return _quantize_dense(_Quantization(layers | {"values": values}, peaks), [*layers])
+
+
+def layers_of(weights: Weights) -> dict[str, Layer]:
+    """The layers of a network of sets; those that act on the same sums are one."""
+    layer = partial(read_layer, weights)
 
     def joined(*names: str) -> list[np.ndarray]:
         return [layer(f"sets.{number}.{name}")[0] for number in _NUMBERS for name in names]
@@ -70,7 +89,8 @@ def layers_of(weights: Weights) -> dict[str, Matrix]:
     layers["own"] = np.concatenate([own, *joined("of_all")]), bias
     moves = np.concatenate([layer("action")[0], *joined("nearer", "along")])
     layers["moves"] = moves, np.zeros(moves.shape[1])
-    return layers | {name: layer(name) for name in ("state", "hidden", "advantage")}
+    layers["advantage"] = layer("advantage")[0], np.zeros(1)  # what all actions share
+    return layers | {name: layer(name) for name in ("state", "hidden")}
 
 
 def trace(weights: Weights, observations: Iterable[Observation]) -> Activations:
@@ -92,7 +112,7 @@ def trace(weights: Weights, observations: Iterable[Observation]) -> Activations:
 
 
 def compute_activations(
-    layers: Mapping[str, Matrix], own: np.ndarray, actions: np.ndarray, *sets: np.ndarray
+    layers: Mapping[str, Layer], own: np.ndarray, actions: np.ndarray, *sets: np.ndarray
 ) -> dict[str, np.ndarray]:
     """All that a network computes of an observation, in double precision.
 
@@ -180,45 +200,31 @@ def _pair_up(together: np.ndarray) -> np.ndarray:
 
 
 class _Quantization:
-    """The layers of a network, one after the other, as integers."""
+    """The layers of a network, one after the other, as integers.
 
-    def __init__(self, weights: Weights, peaks: Mapping[str, np.ndarray]) -> None:
-        self._layers = layers_of(weights)
+    Attributes:
+        matrices: The (inputs, outputs) weights of the layers so far, by name.
+        biases: Their biases.
+        shifts: Their shifts.
+    """
+
+    def __init__(self, layers: Mapping[str, Layer], peaks: Mapping[str, np.ndarray]) -> None:
+        self._layers = layers
         self._peaks = peaks
-        self._matrices: dict[str, np.ndarray] = {}
-        self._biases: dict[str, np.ndarray] = {}
-        self._shifts: dict[str, int] = {}
+        self.matrices: dict[str, np.ndarray] = {}
+        self.biases: dict[str, np.ndarray] = {}
+        self.shifts: dict[str, int] = {}
 
-    def integers(self) -> Integers:
-        """The integers of the network."""
-        own, action = (self._input_scales(name) for name in ("own_inputs", "action"))
-        scales = {"own": own, "action": action}
-        pooled = []
-        for n in _NUMBERS:
-            lines = scales[f"lines{n}"] = self._input_scales(f"lines{n}")
-            first = self._add(f"context{n}", own, {f"inputs{n}": lines})
-            second = self._add(f"layer{n}", first)
-            pooled.append(self._add(f"values{n}", second))
-        state = self._add("own", np.concatenate([own, *pooled]))
-        moves = np.concatenate([action, *(part for of_set in pooled for part in (of_set, of_set))])
-        hidden = self._add("state", state, {"moves": moves})
-        last = self._add("hidden", hidden)
-        self._add_values(last)
-        packed = [_pack(self._matrices[name], LAYERS[name]) for name in LAYERS]
-        columns = [np.pad(scales[name], (0, SCALES[name] - len(scales[name]))) for name in SCALES]
-        return Integers(
-            np.concatenate(packed),
-            np.concatenate([self._biases[name] for name in SHIFTED]).astype(np.int32),
-            np.array([self._shifts[name] for name in SHIFTED], np.int32),
-            np.concatenate(columns).astype(np.float32),
-        )
+    def outputs_of(self, names: Iterable[str]) -> list[int]:
+        """The numbers of outputs of layers."""
+        return [self._layers[name][0].shape[1] for name in names]
 
-    def _input_scales(self, name: str) -> np.ndarray:
+    def input_scales(self, name: str) -> np.ndarray:
         """Scales of inputs: powers of two, so that only the last rounding loses anything."""
         peaks = np.maximum(ROOM * self._peaks[name], 2.0**-3)
         return 2.0 ** np.floor(np.log2(MOST / peaks))
 
-    def _add(
+    def add(
         self, name: str, scales: np.ndarray, others: Mapping[str, np.ndarray] | None = None
     ) -> np.ndarray:
         """Add a layer; return the scales of its outputs.
@@ -238,18 +244,69 @@ class _Quantization:
         shift = max(int(np.ceil(np.median(np.log2(limit * peaks / MOST)))), 1)
         steps = np.minimum(limit, MOST * 2.0**shift / peaks)
         for part, matrix in wanted.items():
-            self._matrices[part] = _round(matrix * steps)
-        self._biases[name] = _round(bias * steps) + 2 ** (shift - 1)
-        self._shifts[name] = shift
-        _check(np.concatenate([self._matrices[part] for part in parts]), self._biases[name])
+            self.matrices[part] = _round(matrix * steps)
+        self.biases[name] = _round(bias * steps) + 2 ** (shift - 1)
+        self.shifts[name] = shift
+        _check(np.concatenate([self.matrices[part] for part in parts]), self.biases[name])
         return steps / 2.0**shift
 
-    def _add_values(self, scales: np.ndarray) -> None:
-        """Add the last layer, whose sums are compared as they are."""
-        matrix = self._layers["advantage"][0] / scales[:, None]
-        steps = _largest_scales(matrix, np.zeros(1))
-        self._matrices["advantage"] = _round(matrix * steps)
-        _check(self._matrices["advantage"], np.zeros(1))
+    def add_values(self, name: str, scales: np.ndarray) -> None:
+        """Add the last layer, whose sums are compared as they are: all have the same scale."""
+        matrix, bias = self._layers[name]
+        matrix = matrix / scales[:, None]
+        step = _largest_scales(matrix, bias).min()
+        self.matrices[name] = _round(matrix * step)
+        self.biases[name] = _round(bias * step)
+        _check(self.matrices[name], self.biases[name])
+
+
+def _quantize_sets(quantization: _Quantization) -> Integers:
+    """The layers of a network of sets in their order."""
+    add, input_scales = quantization.add, quantization.input_scales
+    own, action = (input_scales(name) for name in ("own_inputs", "action"))
+    scales = {"own": own, "action": action}
+    pooled = []
+    for n in _NUMBERS:
+        lines = scales[f"lines{n}"] = input_scales(f"lines{n}")
+        first = add(f"context{n}", own, {f"inputs{n}": lines})
+        second = add(f"layer{n}", first)
+        pooled.append(add(f"values{n}", second))
+    state = add("own", np.concatenate([own, *pooled]))
+    moves = np.concatenate([action, *(part for of_set in pooled for part in (of_set, of_set))])
+    hidden = add("state", state, {"moves": moves})
+    last = add("hidden", hidden)
+    quantization.add_values("advantage", last)
+    packed = [_pack(quantization.matrices[name], LAYERS[name]) for name in LAYERS]
+    columns = [_fill(scales[name], SCALES[name]) for name in SCALES]
+    return Integers(
+        np.concatenate(packed),
+        np.concatenate([quantization.biases[name] for name in SHIFTED]).astype(np.int32),
+        np.array([quantization.shifts[name] for name in SHIFTED], np.int32),
+        np.concatenate(columns).astype(np.float32),
+    )
+
+
+def _quantize_dense(quantization: _Quantization, names: Sequence[str]) -> Integers:
+    """The hidden layers of a dense network in their order, and that of its values."""
+    inputs = scales = quantization.input_scales("inputs")
+    widths = filled_widths(len(inputs), quantization.outputs_of(names))
+    packed = []
+    biases = []
+    for name, before, width in zip(names, widths, widths[1:], strict=False):
+        scales = quantization.add(name, scales)
+        for first in range(0, width, BLOCK):
+            block = quantization.matrices[name][:, first : first + BLOCK]
+            packed.append(_pack(block, (before, BLOCK)))
+        biases.append(_fill(quantization.biases[name], width))
+    quantization.add_values("values", scales)
+    packed.append(_pack(quantization.matrices["values"], (widths[-1], VALUES)))
+    biases.append(_fill(quantization.biases["values"], VALUES))
+    return Integers(
+        np.concatenate(packed),
+        np.concatenate(biases).astype(np.int32),
+        np.array([quantization.shifts[name] for name in names], np.int32),
+        _fill(inputs, widths[0]).astype(np.float32),
+    )
 
 
 def _largest_scales(matrix: np.ndarray, bias: np.ndarray) -> np.ndarray:
@@ -274,6 +331,11 @@ def _check(matrix: np.ndarray, bias: np.ndarray) -> None:
     largest = np.abs(matrix).sum(0) * MOST + np.abs(bias)
     if np.abs(matrix).max() > _MOST_WEIGHT or largest.max() >= 2**31:
         raise ArithmeticError("a sum of integers exceeds its bits")
+
+
+def _fill(values: np.ndarray, size: int) -> np.ndarray:
+    """Values with zeros behind them."""
+    return np.pad(values, (0, size - len(values)))
 
 
 def _pack(matrix: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -40,7 +40,8 @@ ROOMS = {
         *("envs.observations", "envs", "envs.integrations"),
     ),
     "policies": (
-        *("shipped", "network", "integers", "quantization", "adapter", "choices", "flight"),
+        *("shipped", "network", "integers", "dense", "quantization"),
+        *("adapter", "choices", "flight"),
         *("heuristics", "planner"),
         *("learner.config", "learner.policy", "learner.arrays", "learner.trained"),
         "learner.network",

@@ -4,34 +4,37 @@
 
 writes the integers of a trained policy beside its float weights; again, they have the same bytes.
 The missions are those of its own scenarios and, if it decides on any sea, of the shipped data
-sheets and of drawn ones; all with lone UAVs as well, which see the largest values.
+sheets and of drawn ones; otherwise with larger fleets and a larger quota. All are flown with lone
+UAVs as well, which see the largest values.
 """
 
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dess.base.errors import InputError
-from dess.envs.observations.sets import Sets
-from dess.envs.observations.states import CompactStates, compact_states, masks
+from dess.envs.observations.states import CompactStates, Layout, compact_states, masks
 from dess.model.batch import simulate_batch
 from dess.model.view import View
-from dess.policies.integers import HIDDEN, Integers
+from dess.policies.integers import Integers
 from dess.policies.learner.config import TrainingConfig
 from dess.policies.learner.policy import LearnedPolicy
-from dess.policies.learner.trained import has_integers, load_teacher, save_integers
+from dess.policies.learner.trained import INTEGER_KINDS, has_integers, load_teacher, save_integers
 from dess.policies.network import Weights
-from dess.policies.quantization import Observation, quantize
+from dess.policies.quantization import Observation, quantize, quantize_dense
 from dess.scenario.families import SET_FAMILIES
 from dess.scenario.scenario import ScenarioSpace, load_scenario, scenario_names
 
 SEED = 910_000_001  # of the missions, and of what is drawn
 MOST_OWN = 70  # of the scenarios of a training
 MISSIONS = 2  # of each scenario
-EVERY = 8  # slots, of which one is observed
 DECISIONS = 40  # of each scenario, at most
+MISSIONS_OF_ONE = 50  # of the only scenario of a policy that decides on no other
+DECISIONS_OF_ONE = 2000
+EVERY = 8  # slots, of which one is observed
 DRAWN = 40  # sheets
 
 
@@ -42,7 +45,7 @@ class _Recorder:
         self.name = policy.name
         self.policy = policy
         self.slots = 0
-        self.seen: list[tuple[Sets, CompactStates, int]] = []
+        self.seen: list[tuple[Any, CompactStates, int]] = []
 
     def act(self, view: View) -> np.ndarray:
         """As the policy."""
@@ -60,9 +63,9 @@ class _Recorder:
                 state = CompactStates(*(part[b : b + 1] for part in states))
                 self.seen.append((encoder, state, int(view.uav[row])))
 
-    def observations(self) -> Iterator[Observation]:
-        """What it has observed, sea by sea: at most ``DECISIONS`` in all."""
-        seen = self.seen[:: max(-(-len(self.seen) // DECISIONS), 1)]
+    def observations(self, decisions: int) -> Iterator[Observation]:
+        """What it has observed, sea by sea: at most so many decisions in all."""
+        seen = self.seen[:: max(-(-len(self.seen) // decisions), 1)]
         for encoder in {id(encoder): encoder for encoder, *_ in seen}.values():
             rows = [(state, uav) for other, state, uav in seen if other is encoder]
             states, uavs = zip(*rows, strict=True)
@@ -71,7 +74,7 @@ class _Recorder:
 
 
 def calibrate(policy: LearnedPolicy, weights: Weights, config: TrainingConfig) -> Integers:
-    """The integers of a policy that decides on any sea.
+    """The integers of a policy.
 
     Args:
         policy: The policy, which acts with its float weights.
@@ -79,21 +82,41 @@ def calibrate(policy: LearnedPolicy, weights: Weights, config: TrainingConfig) -
         config: The settings of its training.
     """
     own = config.mission_spaces()
+    if policy.layout is not None:
+        spaces = [*own, *(_beyond(space, policy.layout) for space in own)]
+        seen = observations_of(policy, spaces, MISSIONS_OF_ONE, DECISIONS_OF_ONE)
+        return quantize_dense(weights, [*seen])
     spaces = [*own[:: -(-len(own) // MOST_OWN)], *_shipped(), *map(drawn_sheet, range(DRAWN))]
     return quantize(weights, [*observations_of(policy, spaces)])
 
 
-def observations_of(policy: LearnedPolicy, spaces: list[ScenarioSpace]) -> Iterator[Observation]:
+def observations_of(
+    policy: LearnedPolicy,
+    spaces: list[ScenarioSpace],
+    missions: int = MISSIONS,
+    decisions: int = DECISIONS,
+) -> Iterator[Observation]:
     """What a policy observes in missions of scenarios, and in those of lone UAVs.
 
-    Of each scenario some decisions are taken, from the first to the last.
+    Args:
+        policy: The policy.
+        spaces: The scenarios.
+        missions: The missions of each.
+        decisions: The decisions that are taken of each at most, from the first to the last.
     """
     for space in spaces:
         for fleet in dict.fromkeys([space.uavs, (1, 1)]):
             recorder = _Recorder(policy)
             of_fleet = space.model_copy(update={"uavs": fleet})
-            simulate_batch(of_fleet, recorder, SEED, MISSIONS)
-            yield from recorder.observations()
+            simulate_batch(of_fleet, recorder, SEED, missions)
+            yield from recorder.observations(decisions)
+
+
+def _beyond(space: ScenarioSpace, layout: Layout) -> ScenarioSpace:
+    """The same layout with twice the UAVs, as far as the zone has room, and twice the quota."""
+    _, _, width, height = layout.zone
+    uavs = min(2 * space.uavs[1], int(width * height))
+    return space.model_copy(update={"uavs": (uavs, uavs), "quota": 2 * space.quota})
 
 
 def drawn_sheet(seed: int) -> ScenarioSpace:
@@ -129,11 +152,11 @@ def main(folder: Path) -> None:
     """Write the integers of a trained policy.
 
     Raises:
-        InputError: If the folder has no policy that decides on any sea.
+        InputError: If the folder has no policy that can act in integers.
     """
     teacher = load_teacher(folder)
     if not has_integers(teacher[2]):
-        raise InputError(folder, "its policy cannot act in integers", f"sets with hidden {HIDDEN}")
+        raise InputError(folder, "its policy cannot act in integers", INTEGER_KINDS)
     save_integers(folder, calibrate(*teacher))
 
 

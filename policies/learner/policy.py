@@ -1,17 +1,19 @@
 """The learned policy: the allowed action with the highest Q-value (eq. 25)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from dess.base.errors import InputError
 from dess.envs.observations.sets import SEA_PART, Sets, sea_of
-from dess.envs.observations.states import CompactStates, Layout, compact_states, masks
+from dess.envs.observations.states import MASK, CompactStates, Layout, compact_states, masks
+from dess.envs.observations.vector import Vector
 from dess.model.channel import World
 from dess.model.view import View
+from dess.policies.dense import choose, filled_widths
 from dess.policies.integers import Integers, decide
-from dess.policies.network import Weights
+from dess.policies.network import DuelingNetwork, Weights
 
 # The rounding errors of a network in floats depend on the number of rows that it evaluates together
 # and on the processor, but the action must not. So if the two best values differ by less than a
@@ -32,6 +34,27 @@ class IntegerNetwork:
         """The (R,) allowed actions with the highest values, as ``FloatNetwork``."""
         actions = np.empty(len(missions), np.int64)
         decide(states, missions, uavs, encoder.sea, encoder.tables, self.integers, actions)
+        return actions
+
+
+class DenseIntegerNetwork:
+    """A dense network in integers, with which a policy acts."""
+
+    def __init__(self, integers: Integers, inputs: int, hidden: Sequence[int]) -> None:
+        """Make it of its integers, the number of inputs, and the widths of its hidden layers."""
+        self.integers = integers
+        self._widths = np.array(filled_widths(inputs, hidden))
+
+    def choose_actions(
+        self, encoder: Vector, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+    ) -> np.ndarray:
+        """The (R,) allowed actions with the highest values, as ``FloatNetwork``."""
+        actions = np.empty(len(missions), np.int64)
+        allowed = states.uavs[missions, uavs, MASK].astype(np.int64)
+        for first in range(0, len(missions), DuelingNetwork.rows):
+            rows = slice(first, first + DuelingNetwork.rows)
+            (vectors,) = encoder.encode(states, missions[rows], uavs[rows])
+            choose(vectors, allowed[rows], self._widths, self.integers, actions[rows])
         return actions
 
 
@@ -93,7 +116,7 @@ class LearnedPolicy:
     def __init__(
         self, name: str, observation: Any, network: Any, guarded: bool, layout: Layout | None
     ):
-        """Make the policy of a network: ``IntegerNetwork`` or ``FloatNetwork``."""
+        """Make the policy of a network in integers or in floats."""
         self.name = name
         self.observation = observation
         self.guarded = guarded

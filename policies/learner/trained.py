@@ -1,7 +1,7 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
 ``config.json`` describes the weights (``dess.policies.learner.config``) and has their checksum. A
-policy for any sea acts with ``integers.safetensors``, which was made of these weights
+policy of vectors or of sets acts with ``integers.safetensors``, which was made of these weights
 (``dess.policies.learner.calibration``) and has a checksum of both.
 """
 
@@ -27,6 +27,7 @@ from dess.envs.observations.sets import Sets
 from dess.envs.observations.states import Layout, layout_of
 from dess.envs.observations.vector import Vector
 from dess.policies import network
+from dess.policies.dense import dense_forms
 from dess.policies.integers import HIDDEN, Integers, check_integers, integer_forms
 from dess.policies.learner.arrays import (
     Arrays,
@@ -51,11 +52,17 @@ from dess.policies.learner.config import (
     read_description,
     resume_command,
 )
-from dess.policies.learner.policy import FloatNetwork, IntegerNetwork, LearnedPolicy
+from dess.policies.learner.policy import (
+    DenseIntegerNetwork,
+    FloatNetwork,
+    IntegerNetwork,
+    LearnedPolicy,
+)
 from dess.policies.network import Weights
 from dess.scenario.scenario import ScenarioSpace
 
 INTEGERS = "integers.safetensors"
+INTEGER_KINDS = f"vector, or sets with hidden {HIDDEN}"  # that ``has_integers``
 _SUM = "sha256"  # the array with the checksum of integers and of the weights they are made of
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
@@ -181,8 +188,26 @@ def load_teacher(folder: Path) -> tuple[LearnedPolicy, Arrays, TrainingConfig]:
 
 
 def has_integers(config: TrainingConfig) -> bool:
-    """Whether a policy of a config can act in integers: on any sea, with the compiled widths."""
-    return config.algorithm == "ppo" and tuple(config.hidden) == HIDDEN
+    """Whether a policy of a config can act in integers."""
+    if config.observation == "sets":
+        return tuple(config.hidden) == HIDDEN
+    return config.observation == "vector"
+
+
+def _integer_forms(config: TrainingConfig, observation: Any) -> Arrays:
+    """Arrays of the forms of the integers of a config's network."""
+    if config.observation == "sets":
+        return integer_forms()
+    ((inputs,),) = observation.shapes
+    return dense_forms(inputs, config.hidden)
+
+
+def _integer_network(config: TrainingConfig, observation: Any, integers: Integers) -> Any:
+    """The network of a config that acts with these integers."""
+    if config.observation == "sets":
+        return IntegerNetwork(integers)
+    ((inputs,),) = observation.shapes
+    return DenseIntegerNetwork(integers, inputs, config.hidden)
 
 
 def save_integers(folder: Path, integers: Integers) -> None:
@@ -196,7 +221,7 @@ def save_integers(folder: Path, integers: Integers) -> None:
     write_file(folder / INTEGERS, save(make_contiguous(arrays)))
 
 
-def _parse_integers(content: bytes, model: bytes, path: Path) -> Integers | None:
+def _parse_integers(content: bytes, model: bytes, forms: Arrays, path: Path) -> Integers | None:
     """The integers in the content of a file; None without the checksum for these weights.
 
     Raises:
@@ -206,8 +231,7 @@ def _parse_integers(content: bytes, model: bytes, path: Path) -> Integers | None
         arrays = load(content)
     except (SafetensorError, ValueError, KeyError) as error:
         raise describe_damage(path, error) from None
-    forms = integer_forms() | {_SUM: np.empty(32, np.uint8)}
-    require_same_forms(arrays, forms, str(path))
+    require_same_forms(arrays, forms | {_SUM: np.empty(32, np.uint8)}, str(path))
     expected = arrays.pop(_SUM)
     if not np.array_equal(expected, _sum_of(arrays, model)):
         return None
@@ -271,10 +295,11 @@ def _make_cached_policy(
     require_weights(weights, expected_weights(config, observation), str(path))
     parsed = None
     if integers and has_integers(config):
-        parsed = _parse_integers(integers, content, folder / INTEGERS)
+        forms = _integer_forms(config, observation)
+        parsed = _parse_integers(integers, content, forms, folder / INTEGERS)
     if parsed:
         acting = parsed._asdict()
-        chosen = IntegerNetwork(parsed)
+        chosen = _integer_network(config, observation, parsed)
         policy = LearnedPolicy(config.name, observation, chosen, config.guard, layout)
     else:
         acting = weights

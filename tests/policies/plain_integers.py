@@ -1,12 +1,15 @@
 """The network in integers in plain numpy, layer by layer, with sums of 64 bits."""
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from dess.base.vectors import MOST
 from dess.model.state import HOVER
-from dess.policies.integers import SCALES, SETS, SHIFTED, Integers
+from dess.policies.dense import BLOCK, VALUES, filled_widths
+from dess.policies.integers import ACTIONS, SCALES, SETS, SHIFTED, Integers
 from dess.policies.quantization import unpack
 
 
@@ -22,6 +25,38 @@ class Result(NamedTuple):
     values: np.ndarray
     clipped: dict[str, int]
     activations: int
+
+
+class PlainDense:
+    """The dense network of ``Integers``, with these numbers of inputs and of hidden units."""
+
+    def __init__(self, integers: Integers, inputs: int, hidden: Sequence[int]) -> None:
+        self._integers = integers
+        self._widths = [*filled_widths(inputs, hidden), VALUES]
+
+    def __call__(self, vectors: np.ndarray) -> Result:
+        """The values of (R, F) vectors."""
+        weights, biases, shifts, scales = self._integers
+        scaled = np.zeros((len(vectors), self._widths[0]), np.float32)
+        scaled[:, : vectors.shape[1]] = vectors * scales[: vectors.shape[1]]
+        values = np.floor(scaled + np.float32(0.5))
+        clipped = {"inputs": int((np.abs(values) > MOST).sum())}
+        activations = values.size
+        values = values.clip(-MOST, MOST).astype(np.int64)
+        for number, (before, width) in enumerate(pairwise(self._widths)):
+            block = min(width, BLOCK)
+            matrix, weights = np.split(weights, [before * width])
+            bias, biases = np.split(biases, [width])
+            blocks = matrix.astype(np.int64).reshape(width // block, before // 2, block, 2)
+            sums = values @ blocks.transpose(1, 3, 0, 2).reshape(before, width) + bias
+            assert np.abs(sums).max() < 2**31
+            if number == len(shifts):
+                return Result(sums[:, :ACTIONS], clipped, activations)
+            values = sums >> shifts[number]
+            clipped[f"{number}"] = int((values > MOST).sum())
+            activations += values.size
+            values = values.clip(0, MOST)
+        raise AssertionError("no layer of values")
 
 
 class PlainIntegers:

@@ -16,17 +16,18 @@ from dess.model.batch import simulate_batch
 from dess.model.channel import world_of
 from dess.model.state import constants_of
 from dess.physics.chart import NO_FLY
+from dess.policies.dense import choose, dense_forms, filled_widths
 from dess.policies.integers import HIDDEN, Integers, decide
 from dess.policies.learner.calibration import DRAWN, drawn_sheet
 from dess.policies.learner.trained import load_policy
-from dess.policies.network import SetNetwork, weight_shapes
-from dess.policies.quantization import quantize
+from dess.policies.network import DuelingNetwork, SetNetwork, weight_shapes
+from dess.policies.quantization import quantize, quantize_dense
 from dess.policies.registry import TRAINED
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from tests.dess.envs.observations.any_teams import any_teams
 from tests.dess.model.flights import assert_same_alone, first_view
-from tests.drawn import spaces
-from tests.policies.plain_integers import PlainIntegers
+from tests.drawn import seeds, spaces
+from tests.policies.plain_integers import PlainDense, PlainIntegers
 
 FORMS = ("avx2", "sse2", "plain")
 
@@ -64,6 +65,30 @@ def test_actions_are_those_of_the_plain_network(data):
     allowed = states.uavs[:, uav, MASK, None] >> np.arange(5) & 1
     values = PlainIntegers(_integers())(*encoder.encode(states, missions, uavs)).values
     assert (actions == np.where(allowed, values, -(2**60)).argmax(1)).all()
+
+
+@settings(max_examples=25)
+@given(st.integers(1, 40), st.lists(st.integers(1, 300), min_size=1, max_size=3), seeds)
+def test_actions_are_those_of_the_plain_dense_network(inputs, hidden, seed):
+    generator = np.random.default_rng(seed)
+    forms = weight_shapes(DuelingNetwork.layer_sizes([(inputs,)], hidden))
+    weights = {
+        name: generator.normal(size=form).astype(np.float32) / np.float32(np.sqrt(form[-1]))
+        for name, form in forms.items()
+    }
+    vectors = generator.normal(size=(30, inputs)).astype(np.float32)
+    integers = quantize_dense(weights, [(vectors[:20],)])
+    for name, form in dense_forms(inputs, hidden).items():
+        assert getattr(integers, name).shape == form.shape
+    masks = generator.integers(1, 32, 30)
+    actions = np.empty(30, np.int64)
+    choose(vectors, masks, np.array(filled_widths(inputs, hidden)), integers, actions)
+    values = PlainDense(integers, inputs, hidden)(vectors).values
+    allowed = masks[:, None] >> np.arange(5) & 1
+    assert (actions == np.where(allowed, values, -(2**60)).argmax(1)).all()
+    in_floats = DuelingNetwork(weights, np.float64)(vectors[:20].astype(np.float64))
+    given_away = in_floats.max(1) - in_floats[np.arange(20), values[:20].argmax(1)]
+    assert (given_away <= 0.02 * np.abs(in_floats).max()).all()
 
 
 def _best_form() -> str:
@@ -112,9 +137,13 @@ def test_features_choose_the_form():
     assert vectors.form_of("wasm32-unknown-unknown", "+avx2") == "wasm"
 
 
-def test_missions_are_the_same_in_any_batch_in_threads_and_in_both_engines():
-    policy = load_policy(TRAINED / "generalist")
-    for name in ("paper", "jade-bight"):
+@pytest.mark.parametrize(
+    ("name", "seas"), [("generalist", ("paper", "jade-bight")), ("ddqn", ("paper",))]
+)
+def test_missions_are_the_same_in_any_batch_in_threads_and_in_both_engines(name, seas):
+    policy = load_policy(TRAINED / name)
+    assert policy.integers is not None
+    for name in seas:
         space = load_scenario(name)
         assert_same_alone(space, policy, 63, range(2), batch_size=2)
         records = [
@@ -130,9 +159,9 @@ class _Watch:
 
     name = "watch"
 
-    def __init__(self, policy) -> None:
+    def __init__(self, policy, plain) -> None:
         self.policy = policy
-        self.plain = PlainIntegers(policy._network.integers)
+        self.plain = plain
         self.clipped = self.activations = self.slots = 0
 
     def act(self, view):
@@ -149,9 +178,20 @@ class _Watch:
 
 def test_next_to_no_activation_is_clipped_in_missions_of_sheets():
     """Neither for a lone UAV, nor on a sheet that no calibration has seen."""
-    watch = _Watch(load_policy(TRAINED / "generalist"))
+    policy = load_policy(TRAINED / "generalist")
+    watch = _Watch(policy, PlainIntegers(policy.integers))
     for uavs in (1, 3):
         simulate_batch(load_scenario("jade-bight", uavs=uavs), watch, 20261214, 2)
     simulate_batch(drawn_sheet(DRAWN + 1), watch, 20261214, 2)
+    assert watch.activations > 1_000_000
+    assert watch.clipped <= watch.activations / 100_000
+
+
+def test_next_to_no_activation_is_clipped_in_missions_of_one_layout():
+    """Neither in larger fleets than those of the training, nor with another quota."""
+    policy = load_policy(TRAINED / "ddqn")
+    watch = _Watch(policy, PlainDense(policy.integers, *policy.observation.shapes[0], [256, 256]))
+    for changes in ({}, {"uavs": 1}, {"uavs": 6, "quota": 600}):
+        simulate_batch(load_scenario("paper", **changes), watch, 20261214, 20)
     assert watch.activations > 1_000_000
     assert watch.clipped <= watch.activations / 100_000

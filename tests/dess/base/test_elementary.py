@@ -252,7 +252,7 @@ def test_compiled_code_rounds_a_product_before_it_is_added():
 
 # The rooms on the way to the records of heuristics, of the planner and of a network in integers.
 ROOMS = ("dess/base", "dess/physics", "dess/scenario", "dess/model", "dess/envs/observations")
-ROOMS += ("policies/planner", "policies/choices.py", "policies/integers.py")
+ROOMS += ("policies/planner", "policies/choices.py", "policies/integers.py", "policies/dense.py")
 # What is exact, or rounded in one way only: all else of ``math`` is the C library's.
 OF_MATH = {
     *("ceil", "floor", "fsum", "inf", "isfinite", "isnan", "lcm", "nan", "pi", "radians", "sqrt"),

@@ -24,7 +24,7 @@ from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import make_network, to_arrays
 from dess.policies.learner.session import CURVE, LOCK, choose_device, train
-from dess.policies.learner.trained import make_observation, read_weights
+from dess.policies.learner.trained import INTEGERS, make_observation, read_weights
 from dess.policies.learner.training import DivergenceError, Training
 from tests.analysis.small import files_of
 from tests.policies.learner.tiny import (
@@ -99,7 +99,7 @@ def test_the_folder_of_a_training(whole, tmp_path):
     assert training.done
     assert_same(training, whole)
     assert seen == [(tick, 1) for tick in range(1, 41)]
-    assert set(files_of(out)) == {CHECKPOINT, CONFIG, CURVE, MODEL}
+    assert set(files_of(out)) == {CHECKPOINT, CONFIG, CURVE, INTEGERS, MODEL}
     names = pq.read_schema(out / CURVE).names
     rows = [{name: row.get(name) for name in names} for row in training.curve]
     assert pq.read_table(out / CURVE).to_pylist() == rows
