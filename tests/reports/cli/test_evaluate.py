@@ -22,6 +22,14 @@ def test_a_trained_policy_says_when_it_acts_outside_of_its_training(dess):
         assert code == 0 and f"note: ddqn acts outside of its training: {words}\n" in err
 
 
+def test_a_former_name_of_a_policy_is_taken_and_told(dess):
+    command = ("evaluate", "--scenario", "small.toml", "--missions", 1, "--policy", "greedy")
+    code, _, err = dess(*command, "--policy", "any")
+    told = "dess: the policy any is now generalist"
+    assert code == 0 and err.splitlines().count(told) == 1
+    assert told not in dess(*command, "--policy", "generalist")[2]
+
+
 def test_a_policy_that_cannot_act_is_refused_without_a_note(dess):
     beyond = ("--scenario", "bay", "--set", "quota=600", "--policy", "ddqn")
     for command in (("evaluate", "--missions", 1), ("simulate",)):

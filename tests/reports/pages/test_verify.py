@@ -16,6 +16,7 @@ from dess.analysis import load_study, run_study
 from dess.analysis.bound import Bound
 from dess.analysis.results.resimulate import Evidence, learned_files
 from dess.analysis.results.tables import load_results
+from dess.policies import registry
 from dess.policies.registry import TRAINED
 from dess.reports.cli import main
 from dess.reports.pages import verify
@@ -169,6 +170,21 @@ def test_an_incomplete_folder_hides_no_other(results, tmp_path):
     assert fig4.notes == ["incomplete, so not checked"] and table4.compared == 12
     manifest.write_text("{}")
     assert len(verify_results(folder, ALL, 0)[0].differing) == 1
+
+
+def test_results_under_a_former_name_are_shown_and_verified(tmp_path, monkeypatch, capsys):
+    with monkeypatch.context() as before:
+        before.setattr(registry, "FORMER", {})
+        before.setattr(registry, "TRAINED", tmp_path / "trained")
+        shutil.copytree(TRAINED / "generalist", tmp_path / "trained" / "any")
+        run_study(load_study("table4", missions=3, policies=["any"]), tmp_path / "results")
+    shutil.rmtree(tmp_path / "trained")
+    results = load_results(tmp_path / "results")
+    assert [*results.missions["policy"].unique()] == ["any"]
+    [check] = verify_results(tmp_path / "results", ALL, 0)
+    assert (check.compared, check.differing) == (3, [])
+    assert main(["study", "show", str(tmp_path / "results")]) == 0
+    assert re.search(r"^any ", capsys.readouterr().out, re.M)
 
 
 def test_other_weights_are_found(tmp_path, capsys):
