@@ -204,7 +204,7 @@ def release(session: nox.Session) -> None:
     """Check that a release is whole and can be installed; ``-- --check``. It uploads nothing.
 
     It installs wheel, sdist and zip with the oldest and the newest Python, one after the other, and
-    takes up to half an hour and 2 GB; ``docs/maintaining.md`` has the other steps.
+    takes half an hour to an hour and 2 GB; ``docs/maintaining.md`` has the other steps.
     """
     if not session.posargs:
         session.error("release: an argument is missing; allowed: --check")
