@@ -1,4 +1,7 @@
-"""Thirty faults planted by hand in the compiled rules, and which oracles of the tests catch them.
+"""Faults planted by hand in compiled functions, and which oracles of the tests catch them.
+
+Thirty are in the rules, the channel, charging, ages, energy and the guard; four in observations and
+in the bound.
 
 ``python benchmarks/faults.py`` copies the tree, runs the tests of each oracle in the copy, which
 must pass, and then plants one fault after the other; ``--fault NAME`` and ``--oracle NAME`` choose
@@ -58,6 +61,7 @@ RULES, CHANNEL = "dess/model/rules.py", "dess/model/channel.py"
 LINK = "dess/model/link.py"
 CHARGING, AGE, ENERGY = "dess/physics/charging.py", "dess/physics/age.py", "dess/physics/energy.py"
 BATTERY, MOVES = "dess/model/guard/battery.py", "dess/model/guard/moves.py"
+SETS, PATHS = "dess/envs/observations/sets.py", "analysis/bound/paths.py"
 MATCHING = "dess/model/guard/matching.py"
 
 FAULTS = (
@@ -247,16 +251,47 @@ FAULTS = (
         "mission.max_slots - mission.slot <= LAST_SLOTS",
         "mission.max_slots - mission.slot <= 0 * LAST_SLOTS",
     ),
+    # Observations, and the bound of what a mission can collect.
+    Fault(
+        "teammates that charge are near nodes, too",
+        SETS,
+        "if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:",
+        "if j != i and team[j, column.ACTIVE]:",
+    ),
+    Fault(
+        "a zone that is nearer counts as farther",
+        SETS,
+        "line[23] = _share(home - own_home, 20)",
+        "line[23] = _share(own_home - home, 20)",
+    ),
+    Fault(
+        "the bound reaches a cell a slot too late",
+        PATHS,
+        "to_zone[x, y] <= radius",
+        "to_zone[x, y] < radius",
+    ),
+    Fault(
+        "the bound forgets what arrives at the node that is left",
+        PATHS,
+        "    least += left * (then_had[home] - had[home])\n",
+        "",
+    ),
 )
 # The tests of each oracle. ``tests/verification/stress_des.py`` is none: it describes the model in
-# the form of a checklist, and runs no mission.
+# the form of a checklist, and runs no mission. No fault of a rule is caught by ``plain_sets`` or
+# ``tiny_sea`` alone: they stay for observations as sets and for the bound, where nothing else says
+# what is right.
 ORACLES = {
     "auditor": ("tests/dess/model/test_auditor.py",),
     "by hand": ("tests/dess/model/test_missions.py",),
     "closed forms": ("tests/verification/test_theory.py",),
     "plain_sets": ("tests/dess/envs/observations/test_sets.py",),
     "tiny_sea": ("tests/analysis/bound/test_optimum.py", "tests/analysis/bound/test_prices.py"),
-    "guard": ("tests/dess/model/guard/test_guard.py",),
+    "guard": (
+        "tests/dess/model/guard/test_guard.py",
+        "tests/dess/model/guard/test_queues.py",
+        "tests/dess/model/guard/test_matching.py",
+    ),
     # No oracle, but tests of one rule each, which catch what the auditor cannot see.
     "single rules": (
         "tests/dess/model/test_engines.py",
