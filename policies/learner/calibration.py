@@ -4,8 +4,8 @@
 
 writes the integers of a trained policy beside its float weights; again, they have the same bytes.
 The missions are those of its own scenarios and, if it decides on any sea, of the shipped data
-sheets and of drawn ones; otherwise with larger fleets and a larger quota. All are flown with lone
-UAVs as well, which see the largest values.
+sheets and of drawn ones; otherwise with larger fleets and a larger quota. All are simulated
+with lone UAVs as well, which see the largest values.
 """
 
 import sys
