@@ -67,6 +67,7 @@ from dess.physics.energy import (
 from dess.physics.landing import lands
 
 _MOST_BATTERY = 2**40  # more than any way costs
+_FARTHEST = 2**40  # more than any way is long [cells]
 
 
 @inlined
@@ -245,7 +246,7 @@ def safe_moves(mission, uavs, i, chart, charge, home, memory, reach):
         nearest = nearest or moves.nearest
         in_time, clear, empty, aside = moves.in_time, moves.clear, moves.empty, moves.aside
         moves = Moves(nearest, in_time, clear, empty, aside, moves.lacking)
-    return _choose_moves(mission, uavs, i, chart, turns, moves, levels)
+    return _choose_moves(mission, uavs, i, chart, home, turns, moves, levels)
 
 
 @inlined
@@ -269,7 +270,7 @@ def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         level = contest(contested, action)
-        if not _is_legal(chart, x, y, level) or (charge and _asks_too_early(home, action)):
+        if not _is_legal(chart, x, y, level) or (charge and _asks_too_early(chart, u, home, action)):
             continue
         late = 0
         if charge:
@@ -314,9 +315,14 @@ def _is_legal(chart, x, y, level):
 
 
 @inlined
-def _asks_too_early(home, action):
-    """Whether a UAV would ask for a pad, and a teammate would run empty."""
-    return home.gives_way == 1 and action == HOVER
+def _asks_too_early(chart, u, home, action):
+    """Whether a UAV would ask for a pad, and it or a teammate would run empty.
+
+    It would if it hovered in another zone than the one that the plan of pads tells.
+    """
+    asks_elsewhere = home.begins > 0 and u.latch and u.zone >= 0
+    asks_elsewhere = asks_elsewhere and u.zone != chart.zones[home.y, home.x]
+    return action == HOVER and (home.gives_way == 1 or asks_elsewhere)
 
 
 @inlined
@@ -338,7 +344,7 @@ def _leaving_moves(mission, uavs, i, chart, turns, moves):
 
 
 @inlined
-def _choose_moves(mission, uavs, i, chart, turns, moves, levels):
+def _choose_moves(mission, uavs, i, chart, home, turns, moves, levels):
     """The safe actions of UAV ``i`` that neither keeps its place nor leaves it for a teammate."""
     u = uavs[i]
     is_late = moves.lacking > 0
@@ -346,7 +352,7 @@ def _choose_moves(mission, uavs, i, chart, turns, moves, levels):
     if u.overruled and not is_late and moves.nearest & moves.empty:
         return moves.nearest & moves.empty
     if uncontested and is_late and (has_costs(mission) or is_tight(mission, chart.sizes)):
-        return _nearer_to_zone(chart, u, uncontested)
+        return _nearer_to_zone(chart, u, home, uncontested)
     if uncontested and (is_late or u.overruled):
         return uncontested
     if is_late and moves.aside:
@@ -380,25 +386,29 @@ def _late_home(mission, u, action, cells):
 
 
 @inlined
-def _nearer_to_zone(chart, u, actions):
-    """Those of some actions that lead UAV ``u`` nearer to a charging zone; all if none does.
+def _nearer_to_zone(chart, u, home, actions):
+    """Those of some actions that lead UAV ``u`` nearer to its charging zone; all if none does.
 
     Two parking cells may be equally far, and a UAV that is late must not change between them.
     """
     nearer = 0
-    cells = _cells_to_zone(chart, u.x, u.y)
+    cells = _cells_to_zone(chart, home, u.x, u.y)
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        if actions >> action & 1 and _cells_to_zone(chart, x, y) < cells:
+        if actions >> action & 1 and _cells_to_zone(chart, home, x, y) < cells:
             nearer |= 1 << action
     return nearer or actions
 
 
 @inlined
-def _cells_to_zone(chart, x, y):
-    """The cells on the way from a cell to the nearest cell of a charging zone."""
-    number = chart.nearest[y, x]
-    return distance(chart, x, y, chart.parking[number, 0], chart.parking[number, 1])
+def _cells_to_zone(chart, home, x, y):
+    """The cells on the way from a cell to the zone where a UAV will charge."""
+    zone, least = chart.zones[home.y, home.x], _FARTHEST
+    for cell in range(len(chart.parking)):
+        to_x, to_y = chart.parking[cell, 0], chart.parking[cell, 1]
+        if chart.zones[to_y, to_x] == zone:
+            least = min(least, distance(chart, x, y, to_x, to_y))
+    return least
 
 
 @inlined

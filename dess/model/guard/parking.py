@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.base.kernels import inlined, kernel, shared_kernel
-from dess.model.guard.battery import late_slots, margin_slots, usable_battery
+from dess.model.guard.battery import ends_soon, late_slots, margin_slots, usable_battery
 from dess.model.guard.matching import keeps_cell, match_zones
 from dess.model.guard.queues import (
     QUEUE,
@@ -318,6 +318,8 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
     """
     u, best, best_zone, way, least = uavs[i], -1, -1, -1, -1
     battery = -1
+    # shortly before the end, no teammate leaves the cell again that it will take
+    are_closed = is_tight(mission, chart.sizes) and ends_soon(mission, u)
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
@@ -331,7 +333,10 @@ def _best_cell(mission, uavs, i, only, most, chart, memory, reach):
         cells = distance(chart, u.x, u.y, x, y)
         if best >= 0 and _price_of_way(mission, u, chart, x, y, cells, reach) > least:
             continue  # and more with a detour
-        cells = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
+        if are_closed:
+            cells = path_length(mission, uavs, i, chart, memory.planned, u.x, u.y, x, y)
+        else:
+            cells = path_length(mission, uavs, i, chart, None, u.x, u.y, x, y)
         spent = battery_of_way(mission, u, chart, u.x, u.y, x, y, cells, reach)
         price = _price_of_way(mission, u, chart, x, y, cells, reach)
         if best < 0 or price < least or (price == least and cells < way):
