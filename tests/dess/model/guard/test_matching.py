@@ -157,3 +157,26 @@ def test_all_uavs_land_on_tight_seas(sea, changes, seed, missions):
     space = load_scenario(sea, **TIGHT, **changes, zones=zones)
     ends = simulate_batch(space, policies.load("greedy"), seed, missions).uavs["end"]
     assert (ends == END_NAMES.index("landed")).all()
+
+
+GUSTS = {"strength": 0.8, "direction": 40, "gusts": 0.25, "seed": 3}
+
+
+@pytest.mark.parametrize(
+    ("changes", "seed", "mission"),
+    [
+        # A UAV that flies over a zone asks there for a pad that a teammate takes for long.
+        ({"uavs": 4, "pads": 2, "zones": [{"cells": [24, 3, 1, 3], "pads": 1}]}, 7029, 36),
+        # A late UAV flies to and fro between the way to its zone and the one to a nearer, full one.
+        (
+            {"uavs": 6, "pads": 4, "zones": [{"cells": [4, 8, 1, 1], "pads": 1}], "landing": True}
+            | {"quota": 0, "max_slots": 250, "wind": GUSTS},
+            7022,
+            13,
+        ),
+    ],
+)
+def test_no_uav_is_lost_near_a_small_zone_of_the_paper_sea(changes, seed, mission):
+    space = load_scenario("paper", **changes)
+    ends = simulate_batch(space, policies.load("greedy"), seed, [mission]).uavs["end"]
+    assert set(ends[0]) <= {END_NAMES.index("quota"), END_NAMES.index("landed")}
