@@ -270,7 +270,9 @@ def _sort_moves(mission, uavs, i, chart, charge, home, planned, contested, reach
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         level = contest(contested, action)
-        if not _is_legal(chart, x, y, level) or (charge and _asks_too_early(chart, u, home, action)):
+        if not _is_legal(chart, x, y, level):
+            continue
+        if charge and _asks_too_early(chart, u, home, action):
             continue
         late = 0
         if charge:
