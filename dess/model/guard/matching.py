@@ -235,12 +235,14 @@ def spread_out(prices, places, left):
 def _move_on(prices, places, left, start):
     """Let a UAV leave a place by the cheapest chain; the place where this ends, or -1.
 
-    This is Bellman and Ford's algorithm, on places.
+    This is Bellman and Ford's algorithm, on places. It ends with the first round that finds no
+    cheaper chain.
     """
     least = np.full(len(left), _NO_WAY, np.int64)  # the price of a chain to each place
     least[start] = 0
     who = np.full(len(left), -1, np.int64)  # the UAV that goes there in it
     for _ in range(len(left)):
+        is_settled = True
         for j in range(len(prices)):
             now = places[j]
             if now < 0 or prices[j, now] == _NO_WAY or least[now] == _NO_WAY:
@@ -249,6 +251,9 @@ def _move_on(prices, places, left, start):
                 price = least[now] + prices[j, place] - prices[j, now]
                 if place != now and place != start and price < least[place]:
                     least[place], who[place] = price, j
+                    is_settled = False
+        if is_settled:
+            break
     end = -1
     for place in range(len(left)):
         if left[place] > 0 and who[place] >= 0 and (end < 0 or least[place] < least[end]):
