@@ -17,7 +17,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 import dess
-from benchmarks import learning_curves
+from benchmarks import learning_curves, scale
 from dess import load_scenario, policies
 from dess.analysis import load_study, numbers
 from dess.analysis.paper import values
@@ -431,6 +431,14 @@ def test_the_sampling_of_ends_errs_as_the_page_says():
             onto = leaving = (onto + leaving) / 2  # the trapezoidal rule
         found = [[onto], [leaving], [onto - leaving]]
         assert np.round(found, 2).tolist() == numbers_of
+
+
+def test_the_table_of_scale_is_that_of_the_measured_numbers():
+    measured = pd.read_csv(ROOT / "benchmarks" / "scale.csv")
+    page = PAGES["docs/performance.md"]
+    assert scale.table(measured) in page
+    speed_ups = measured[measured["axis"] == "workers"].set_index("value")["speed_up"]
+    assert f"100 workers are {speed_ups[100]:.0f} times as fast as one" in page
 
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves():
