@@ -237,13 +237,13 @@ class _Quantization:
         """
         parts = {name: scales, **(others or {})}
         bias = self._layers[name][1]
-        wanted = {part: self._layers[part][0] / parts[part][:, None] for part in parts}
-        together = np.concatenate([*wanted.values()])
+        scaled = {part: self._layers[part][0] / parts[part][:, None] for part in parts}
+        together = np.concatenate([*scaled.values()])
         limit = _largest_scales(together, bias)
         peaks = np.maximum(ROOM * _round_up(self._peaks[name]), 1e-6)
         shift = max(int(np.ceil(np.median(np.log2(limit * peaks / MOST)))), 1)
         steps = np.minimum(limit, MOST * 2.0**shift / peaks)
-        for part, matrix in wanted.items():
+        for part, matrix in scaled.items():
             self.matrices[part] = _round(matrix * steps)
         self.biases[name] = _round(bias * steps) + 2 ** (shift - 1)
         self.shifts[name] = shift
@@ -340,7 +340,7 @@ def _fill(values: np.ndarray, size: int) -> np.ndarray:
 
 def _pack(matrix: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Weights (inputs, outputs) as ``dess.base.vectors`` has them; what is filled up is zero."""
-    inputs, outputs = (wanted - size for wanted, size in zip(shape, matrix.shape, strict=True))
+    inputs, outputs = (length - size for length, size in zip(shape, matrix.shape, strict=True))
     filled = np.pad(matrix, ((0, inputs), (0, outputs)))
     return filled.reshape(-1, 2, shape[1]).swapaxes(1, 2).astype(np.int16).ravel()
 

@@ -86,7 +86,7 @@ def assumption_facts(results: Results, metric: str = PRODUCT) -> list[Fact]:
     else:
         facts["mission"] = given("horizon", printed(space.max_slots * units.slot, "s"))
         facts["means"] = "over random missions, with 95 % intervals"
-    return [Fact(label, found) for label, found in facts.items()]
+    return [Fact(label, value) for label, value in facts.items()]
 
 
 def slot_in_words(space: ScenarioSpace, varied: set[str]) -> str:
@@ -136,12 +136,12 @@ def data_at_the_start(space: ScenarioSpace, varied: set[str]) -> str:
     if sheet.idle:
         more = f"{backlog}, and " if backlog else ""
         return f"{more}those of {sheet.idle} without a mission, which is their age"
-    told = f"{backlog or 'none'}, of age 0, as if UAVs had just emptied all nodes"
+    initial = f"{backlog or 'none'}, of age 0, as if UAVs had just emptied all nodes"
     hours = 24 - space.max_slots * units.slot / 3600
     if hours < 1:
-        return told
+        return initial
     return (
-        f"{told}; a service of once a day finds the data of {hours:.3g} h more, which are up to "
+        f"{initial}; a service of once a day finds the data of {hours:.3g} h more, which are up to "
         f"{hours:.3g} h old (idle)"
     )
 
@@ -190,7 +190,7 @@ def _types_of(space: ScenarioSpace, varied: set[str]) -> dict[str, str]:
     if varied & {*IN_UNITS, "wind", "hover", "reserve", "tip_speed", "induced_speed", "fleet"}:
         return {}
     named = (sentence.partition(": ") for sentence in type_sentences(space))
-    return {label: found for label, _, found in named}
+    return {label: sentence for label, _, sentence in named}
 
 
 def _rates_of(space: ScenarioSpace, varied: set[str]) -> str:

@@ -81,12 +81,16 @@ def calibrate(policy: LearnedPolicy, weights: Weights, config: TrainingConfig) -
         weights: The weights.
         config: The settings of its training.
     """
-    own = config.mission_spaces()
+    trained = config.mission_spaces()
     if policy.layout is not None:
-        spaces = [*own, *(_beyond(space, policy.layout) for space in own)]
+        spaces = [*trained, *(_beyond(space, policy.layout) for space in trained)]
         seen = observations_of(policy, spaces, MISSIONS_OF_ONE, DECISIONS_OF_ONE)
         return quantize_dense(weights, [*seen])
-    spaces = [*own[:: -(-len(own) // MOST_OWN)], *_shipped(), *map(drawn_sheet, range(DRAWN))]
+    spaces = [
+        *trained[:: -(-len(trained) // MOST_OWN)],
+        *_shipped(),
+        *map(drawn_sheet, range(DRAWN)),
+    ]
     return quantize(weights, [*observations_of(policy, spaces)])
 
 

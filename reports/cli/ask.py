@@ -317,12 +317,12 @@ def _print_answer(
             name: json.loads(table.to_json(orient="records"))
             for name, table in answer.tables().items()
         }
-        told = {
+        sentences = {
             "answers": [answer.headline(), *(fact.line for fact in facts)],
             "assumptions": [fact.line for fact in assumed],
             "facts": [asdict(fact) for fact in facts],
         }
-        print(json.dumps({**about, **told, **rows}, indent=2))
+        print(json.dumps({**about, **sentences, **rows}, indent=2))
     elif page:
         console.print_text(f"page: {page}")
 
