@@ -46,7 +46,7 @@ class Shard(NamedTuple):
         match = _TYPED.fullmatch(text)
         if match and int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))
-        allowed = f"I/N, such as 2/4, of 1 to {MOST:,} shards"
+        allowed = f"I/N, such as 2/4, where N is at most {MOST:,}"
         raise InputError("--shard", f"{shown(text)} is no shard", allowed)
 
     def __str__(self) -> str:
