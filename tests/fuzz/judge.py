@@ -33,7 +33,7 @@ _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach 
 _NEWS = re.compile(
     r"compiling the simulator .*|(at least )?[\d,]+ missions?(, [\d,]+ of them present)?"
     r"|.*\[\d+:[\d:]+[<,] ?.*\]|on this machine: .* to go|replay memory: .*|curves: tensorboard .*"
-    r"|.*: this training is not finished .*"
+    r"|.*: this training is not finished .*|.*: there are no integers of these weights, .*"
 )
 # Folders of others: one that a library makes and uses again, which has the name of the user; and
 # those in which the fuzzer runs notebooks, as a signal may come before one is removed.
