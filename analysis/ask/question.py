@@ -321,6 +321,9 @@ def _cheapest_rule(
     prices = study.costs
     if not prices:
         raise InputError("requirements", "need prices", "prices, such as uav=20000")
+    if not isinstance(requirements, Mapping):
+        allowed = "metrics and what is required of them, such as success=0.99"
+        raise InputError("requirements", f"{shown(requirements)} is no table", allowed)
     least = {}
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)

@@ -7,7 +7,7 @@ from dess import InputError
 from dess.analysis import numbers
 from dess.analysis.results import shards
 from dess.analysis.results.chunks import MANIFEST
-from dess.analysis.results.manifest import Manifest
+from dess.analysis.results.manifest import CellPart, Manifest
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
 
@@ -35,6 +35,8 @@ def merge_shards(folders: Sequence[Path], out: Path | None = None) -> Results:
     if first.study.rule and not first.complete:
         problem = "a rule decides how many missions there are, so it has no shards"
         raise InputError(folders[0], problem, "run the study again to complete it")
+    if out:  # into which nothing is written if a shard is missing
+        _check_complete([*map(Store.read, folders), *([Store.read(out)] if _is_store(out) else [])])
     with Store.open(first, out or folders[0]) as store:
         for folder in folders:
             if folder.resolve() != store.folder.resolve():
@@ -42,19 +44,23 @@ def merge_shards(folders: Sequence[Path], out: Path | None = None) -> Results:
                 for shard in shards.shards_in(folder):
                     is_complete = shard.is_complete(folder)
                     shard.mark(store.folder, is_complete or shard.is_complete(store.folder))
-        _check_complete(store)
+        _check_complete([store])
         manifest = store.manifest
         store.finish(manifest.missions, manifest.selected)
         return results_of(store)
 
 
-def _check_complete(store: Store) -> None:
-    """Name the shards that are missing, with their missions.
+def _is_store(folder: Path) -> bool:
+    return (folder / MANIFEST).exists()
+
+
+def _check_complete(stores: Sequence[Store]) -> None:
+    """Name the shards that some results folders lack together, with their missions.
 
     Raises:
         InputError: If there are any.
     """
-    manifest = store.manifest
+    manifest = stores[0].manifest
     teams = range(len(manifest.policies))
     logged = [manifest.study.logged] * len(manifest.points)
     needs = {
@@ -63,7 +69,7 @@ def _check_complete(store: Store) -> None:
         "bound": ("bounds", [manifest.parts_with_bounds()]),
     }
     gaps = {
-        what: store.missing(kind, [part for of_team in parts for part in of_team])
+        what: _missing(stores, kind, [part for of_team in parts for part in of_team])
         for what, (kind, parts) in needs.items()
     }
     if not any(gaps.values()):
@@ -75,11 +81,19 @@ def _check_complete(store: Store) -> None:
     places = f"{numbers.inflect('design point', len(points))} {_first_of(points)}"
     problem = f"{numbers.join_words(counts)} missing at {places}"
     again = "run the study again"
-    if lost := shards.lost_shards(store.folder):
+    if lost := shards.lost_shards([store.folder for store in stores]):
         named = f"{numbers.inflect('shard', len(lost))} {_first_of(lost)}"
         problem = f"{named} missing or incomplete: {problem}"
         again += f" with --shard {lost[0]}"
-    raise InputError(store.folder, problem, again)
+    raise InputError(stores[0].folder, problem, again)
+
+
+def _missing(stores: Sequence[Store], kind: str, parts: Sequence[CellPart]) -> list[CellPart]:
+    """What of some parts no folder has."""
+    missing = [*parts]
+    for store in stores:
+        missing = store.missing(kind, missing)
+    return missing
 
 
 def _first_of(things: Sequence[object]) -> str:

@@ -6,7 +6,7 @@ is locked while it runs. ``merge.py`` joins the shards.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -81,11 +81,11 @@ def shards_in(folder: Path) -> list[Shard]:
     return [Shard(int(match[1]), int(match[2])) for match in matches if match]
 
 
-def lost_shards(folder: Path) -> list[Shard]:
-    """The shards of which others in a results folder tell, and that are not complete there."""
-    totals = sorted({shard.total for shard in shards_in(folder)})
+def lost_shards(folders: Sequence[Path]) -> list[Shard]:
+    """The shards of which others in some results folders tell, and that none has complete."""
+    totals = sorted({shard.total for folder in folders for shard in shards_in(folder)})
     shards = (Shard(number + 1, total) for total in totals for number in range(total))
-    return [shard for shard in shards if not shard.is_complete(folder)]
+    return [shard for shard in shards if not any(shard.is_complete(folder) for folder in folders)]
 
 
 def forget_shards(folder: Path) -> None:

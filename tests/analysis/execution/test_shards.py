@@ -45,6 +45,9 @@ def test_shards_of_several_folders_are_joined_in_another(study, expected, tmp_pa
     for shard, folder in zip(FOUR, folders, strict=True):
         run_shard(study, folder, shard)
     before = [*map(files_of, folders)]
+    with pytest.raises(InputError, match="shard 4/4 missing or incomplete"):
+        merge_shards(folders[:3], tmp_path / "joined")
+    assert not (tmp_path / "joined").exists()
     merge_shards(folders, tmp_path / "joined")
     assert files_of(tmp_path / "joined") == expected
     assert [*map(files_of, folders)] == before

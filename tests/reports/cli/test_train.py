@@ -58,7 +58,13 @@ def test_a_training_leaves_a_policy_that_flies(dess, tmp_path):
     assert "best product 0." in out
     assert "replay memory: " in err
     assert "curves: tensorboard --logdir runs/tiny/tensorboard\n" in err
-    names = ["checkpoint.safetensors", "config.json", "model.safetensors", "training.parquet"]
+    names = [
+        "checkpoint.safetensors",
+        "config.json",
+        "integers.safetensors",
+        "model.safetensors",
+        "training.parquet",
+    ]
     assert list(files_of(tmp_path / "runs" / "tiny")) == names
     assert policies.load("runs/tiny").name == "tiny"
 
