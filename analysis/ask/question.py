@@ -314,9 +314,7 @@ def _validated_study(
     return study
 
 
-def _cheapest_rule(
-    requirements: Mapping[str, float | str], missions: int, study: Study
-) -> Cheapest:
+def _cheapest_rule(requirements: object, missions: int, study: Study) -> Cheapest:
     """The rule that searches for the cheapest setting that meets the requirements."""
     prices = study.costs
     if not prices:
