@@ -3,6 +3,7 @@
 A temporary folder that a killed process has left is removed by a later one.
 """
 
+import errno
 import json
 import os
 import platform
@@ -196,6 +197,10 @@ def check_place(path: Path) -> None:
         status = path.stat()
     except FileNotFoundError:
         return
+    except OSError as error:
+        if error.errno == errno.ELOOP and path.is_symlink():
+            return  # a link to itself leads nowhere, and is replaced as others are
+        raise
     if not stat.S_ISREG(status.st_mode):
         raise InputError(path, f"is {kind_of(status)}", "a file")
     if path.is_symlink() and Path("/dev") in path.absolute().parents:  # such as /dev/stdout

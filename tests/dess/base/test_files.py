@@ -200,6 +200,13 @@ def test_a_folder_is_there_with_all_its_files_or_not_at_all(tmp_path):
             check_new_folder(tmp_path / name)
 
 
+@pytest.mark.parametrize("leads_to", ["nowhere", "link"])
+def test_a_link_that_leads_nowhere_is_replaced(tmp_path, leads_to):
+    (tmp_path / "link").symlink_to(leads_to)
+    write_file(tmp_path / "link", "content")
+    assert files_of(tmp_path) == {"link": b"content"}
+
+
 @pytest.mark.parametrize("name", ["a\0b", "x" * 256, "none/" + "x" * 256, "loop", "loop/a", "gone"])
 @pytest.mark.parametrize("check", [check_folder, lambda path: check_target(path / "file")])
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path, name, check):
