@@ -879,7 +879,7 @@ def test_the_index_simulates_its_example(visit, tmp_path):
     path.write_text(make_index({}), "utf-8")
     opened = visit(path, 390)
     tab = opened.page
-    tab.locator("[name=b-uavs]").press("Home")
+    tab.locator("[name=b-uavs]:enabled").press("Home")  # it waits for the module
     tab.get_by_role("button", name="Run", exact=True).click()
     done = re.compile(r"^1,000 missions of each\.")
     tab.locator("[data-panel=status]").get_by_text(done).wait_for(timeout=PATIENCE)
