@@ -300,6 +300,8 @@ def _print_answer(
         if assumed:
             console.print_text("What is assumed:")
             print_facts(assumed)
+        # Once more, since the tables may have moved the headline out of the window.
+        console.print_text(f"answer: {answer.headline()}")
         console.print_text(f"study: {question.file}")
     page = None
     absent: object = missing("reports", f"the page of a {asked}")

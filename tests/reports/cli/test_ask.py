@@ -101,7 +101,9 @@ def test_a_what_if_question_is_answered_and_asked_again(dess, unrendered, tmp_pa
     assert out.endswith("page: build/reports/what-if.html\n")
     before = files_of(tmp_path / "results")
     found = json.loads(dess(*WHAT_IF, "--json")[1])
-    assert out.startswith(found["answers"][0]) and f"study: {found['study_file']}" in out
+    headline = found["answers"][0]
+    assert out.startswith(headline)
+    assert f"answer: {headline}\nstudy: {found['study_file']}" in out
     question = Question(load_study(found["study_file"]), Path(found["results"]))
     assert dess(*shlex.split(question.command)[1:])[0] == 0
     assert files_of(tmp_path / "results") == before
