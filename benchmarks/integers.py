@@ -2,14 +2,15 @@
 
 python benchmarks/integers.py test-seas --missions 3
 python benchmarks/integers.py jade-bight new-jersey paper --missions 300
-python benchmarks/integers.py fresh-seas drawn-sheets
+python benchmarks/integers.py drawn-sheets fresh-seas-0 fresh-seas-1
 
 Both fly the same missions. A line has the mean difference of the product (integers minus float) in
 points with its 95 % interval, and the UAVs lost by each. A sea counts once.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 import numpy as np
 from scipy import stats
@@ -21,15 +22,23 @@ from dess.policies.registry import TRAINED
 from dess.scenario.families import SET_FAMILIES, seas_of
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 
-SEED = 20_261_130  # of the missions: those of no calibration
+SEED = 20_261_201  # of the missions: those of no calibration
+DRAWS = 5  # of the sets of seas that are drawn anew
+DRAWN = 60  # seas or sheets of a draw
 PRODUCT = "collection_ratio_and_communication"
 FLEETS = (1, 2, 3)  # of shipped sheets
-SETS = {
+
+
+def fresh_seas(draw: int) -> Iterator[ScenarioSpace]:
+    """Seas of all families that no training has."""
+    for n in range(DRAWN):
+        yield load_scenario(f"{SET_FAMILIES[n % len(SET_FAMILIES)]}:{710_000 + DRAWN * draw + n}")
+
+
+SETS: dict[str, Callable[[], Iterable[ScenarioSpace]]] = {
     "test-seas": lambda: map(load_scenario, seas_of("test")),
-    "fresh-seas": lambda: (
-        load_scenario(f"{SET_FAMILIES[n % len(SET_FAMILIES)]}:{700_000 + n}") for n in range(60)
-    ),
-    "drawn-sheets": lambda: (drawn_sheet(800_000 + n) for n in range(60)),
+    "drawn-sheets": lambda: (drawn_sheet(810_000 + n) for n in range(DRAWN)),
+    **{f"fresh-seas-{draw}": partial(fresh_seas, draw) for draw in range(DRAWS)},
 }
 
 

@@ -6,7 +6,10 @@ layer needs one shift for all of its channels, and no other product. The scales 
 above the largest values of the observations, since a value that is clipped may change an action.
 
 No sum can exceed 32 bits, whatever the inputs are: the scale of a channel is at most what the
-largest possible sum allows.
+largest possible sum allows. So the finer an input is, the coarser are its weights, and the error of
+a weight is the same in all slots of a sea. Some inputs of a network of sets are large, and hence
+coarse. The others of its inputs, and its state, need not be much finer: they leave their last bits
+to their weights.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,6 +25,8 @@ from dess.policies.integers import LAYERS, SCALES, SETS, SHIFTED, Integers
 from dess.policies.network import ACTIONS, Layer, Weights, read_hidden_layers, read_layer
 
 ROOM = 1.5  # by which values may exceed the largest observed ones
+STATE_ROOM = 12.0  # the same of the state of a network of sets
+FINEST = 2.0**10  # the largest scale of its inputs
 ROWS = 64  # observations that are computed together
 _MOST_WEIGHT = 2**15 - 1
 _MOST_SUM = 2**31 - 2**24
@@ -225,7 +230,11 @@ class _Quantization:
         return 2.0 ** np.floor(np.log2(MOST / peaks))
 
     def add(
-        self, name: str, scales: np.ndarray, others: Mapping[str, np.ndarray] | None = None
+        self,
+        name: str,
+        scales: np.ndarray,
+        others: Mapping[str, np.ndarray] | None = None,
+        room: float = ROOM,
     ) -> np.ndarray:
         """Add a layer; return the scales of its outputs.
 
@@ -234,13 +243,14 @@ class _Quantization:
             scales: Of its inputs.
             others: Layers whose products are added to the same sums, with the scales of their
                 inputs.
+            room: By which its outputs may exceed the largest observed ones.
         """
         parts = {name: scales, **(others or {})}
         bias = self._layers[name][1]
         scaled = {part: self._layers[part][0] / parts[part][:, None] for part in parts}
         together = np.concatenate([*scaled.values()])
         limit = _largest_scales(together, bias)
-        peaks = np.maximum(ROOM * _round_up(self._peaks[name]), 1e-6)
+        peaks = np.maximum(room * _round_up(self._peaks[name]), 1e-6)
         shift = max(int(np.ceil(np.median(np.log2(limit * peaks / MOST)))), 1)
         steps = np.minimum(limit, MOST * 2.0**shift / peaks)
         for part, matrix in scaled.items():
@@ -262,7 +272,11 @@ class _Quantization:
 
 def _quantize_sets(quantization: _Quantization) -> Integers:
     """The layers of a network of sets in their order."""
-    add, input_scales = quantization.add, quantization.input_scales
+    add = quantization.add
+
+    def input_scales(name: str) -> np.ndarray:
+        return np.minimum(quantization.input_scales(name), FINEST)
+
     own, action = (input_scales(name) for name in ("own_inputs", "action"))
     scales = {"own": own, "action": action}
     pooled = []
@@ -271,7 +285,7 @@ def _quantize_sets(quantization: _Quantization) -> Integers:
         first = add(f"context{n}", own, {f"inputs{n}": lines})
         second = add(f"layer{n}", first)
         pooled.append(add(f"values{n}", second))
-    state = add("own", np.concatenate([own, *pooled]))
+    state = add("own", np.concatenate([own, *pooled]), room=STATE_ROOM)
     moves = np.concatenate([action, *(part for of_set in pooled for part in (of_set, of_set))])
     hidden = add("state", state, {"moves": moves})
     last = add("hidden", hidden)

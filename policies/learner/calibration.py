@@ -143,8 +143,10 @@ def drawn_sheet(seed: int) -> ScenarioSpace:
         "wind": f"{draw(0.5, 0.5 * cruise)} m/s from SW",
         "horizon": f"{draw(3, 10)} h",
     }
-    uavs = int(generator.integers(1, 6))
-    return load_scenario(f"{family}:{seed}", uavs=uavs, data_sheet=sheet)
+    name = f"{family}:{seed}"
+    _, most = load_scenario(name).limits("uavs")
+    uavs = min(int(generator.integers(1, 6)), int(most))
+    return load_scenario(name, uavs=uavs, data_sheet=sheet)
 
 
 def _shipped() -> list[ScenarioSpace]:
