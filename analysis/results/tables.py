@@ -297,9 +297,6 @@ class Results:
         return self.store.manifest.cells[self.policies.index(policy)][point]
 
 
-_KEPT: dict[Path, Results] = {}  # by their folders
-
-
 def load_results(out: str | Path) -> Results:
     """Load the results of a study.
 
@@ -307,16 +304,7 @@ def load_results(out: str | Path) -> Results:
         InputError: If it is not a results folder, or the results are incomplete, damaged or of
             another version.
     """
-    return _KEPT.get(Path(out).absolute()) or results_of(Store.read(out))
-
-
-def keep_results(out: str | Path) -> None:
-    """Load results once: ``load_results`` returns them here, and in processes forked from here.
-
-    Raises:
-        InputError: As ``load_results``.
-    """
-    _KEPT[Path(out).absolute()] = load_results(out)
+    return results_of(Store.read(out))
 
 
 def results_of(store: Store) -> Results:

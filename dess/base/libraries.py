@@ -22,8 +22,9 @@ from dess.base.errors import InputError
 EXTRAS = {
     "learning": ("torch",),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "jinja2", "jupytext"),
-        *("markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
+        *("matplotlib", "PIL", "seaborn", "SALib", "ipykernel", "IPython", "jinja2"),
+        *("jupyter_client", "jupytext", "markupsafe", "nbclient", "nbconvert", "nbformat"),
+        *("packaging", "pygments"),
     ),
     "geo": ("shapely",),
     "distributed": ("distributed",),

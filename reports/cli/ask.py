@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dess.analysis.ask.question import Question
     from dess.analysis.results.shards import Shard
     from dess.analysis.results.tables import Results
-    from dess.reports.pages.kernels import Progress
+    from dess.reports.pages.missing import Progress
 
 PRICE = "a price and its amount, e.g. uav=20000"
 SHARE = "a metric and its least mean, e.g. success=0.99"

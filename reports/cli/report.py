@@ -25,7 +25,7 @@ from dess.reports.cli.options import (
 from dess.reports.pages import PICTURES
 
 if TYPE_CHECKING:
-    from dess.reports.pages.kernels import Progress
+    from dess.reports.pages.missing import Progress
     from dess.reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set

@@ -1,83 +1,184 @@
-"""Run notebooks, each in a process of its own, after the missions that only its page needs."""
+"""Run notebooks with nbclient, each in a Jupyter kernel of its own, two at a time.
 
-import json
+A kernel listens in a folder that only this user can read, and on no network.
+"""
+
+import asyncio
 import logging
 import os
-import subprocess
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryFile, gettempdir
-from typing import IO, Any
+from tempfile import gettempdir
+from typing import Any
 
-from nbformat import from_dict
+from jupyter_client.kernelspec import KernelSpecManager
+from jupyter_client.manager import AsyncKernelManager
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
+from nbformat import NotebookNode
+from nbformat.v4 import new_output
 
 import dess
 from dess import InputError
-from dess.analysis.results.tables import load_results
 from dess.base.files.writing import temporary_folder
-from dess.reports.pages import ASKED, cells
-from dess.reports.pages.cells import kill_group
+from dess.reports.pages import ASKED
+from dess.reports.pages.missing import Progress
 from dess.reports.pages.notebook import Report
 
 log = logging.getLogger(__name__)
 
-# Called after every cell, with the number of cells run so far and of all cells, and the report.
-Progress = Callable[[int, int, str], None]
-
+AT_ONCE = 2
+STARTUP = 600  # for which a kernel is waited for on a busy machine [s]
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
 PACKAGES = Path(dess.__file__).parents[1]  # the folder from which this package was imported
+# What a library writes to the streams of the process is no output of a cell.
+_OPTIONS = ["--IPKernelApp.capture_fd_output=False", "--InteractiveShell.colors=nocolor"]
 
 
-def run_reports(
-    reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
-) -> None:
+def run_reports(reports: Sequence[Report], progress: Progress | None = None) -> None:
     """Run reports. If one fails, the error is stored in it and the others are still run.
 
     Args:
         reports: The reports, which get the outputs of their cells.
         progress: Called after every cell.
-        shared: Results folders that several of them read, and that are loaded once.
 
     Raises:
         InputError: If a notebook refuses its parameters or results.
     """
-    if not reports:
-        return
     total = sum(len(report.cells) for report in reports)
-    codes = [[cell.source for cell in report.cells] for report in reports]
-    work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
-    with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as errors:
-        formats = dict.fromkeys(kind for report in reports for kind in report.formats)
-        with _start_process(home, errors, formats) as (asked, answers):
-            with suppress(BrokenPipeError):
-                asked.write(json.dumps(work).encode() + b"\n")
-                asked.flush()
-            for number, outputs, error in map(json.loads, answers):
-                report = reports[number]
-                report.cells[report.done].outputs = [from_dict(output) for output in outputs]
-                for warning in (output for output in outputs if output.get("name") == "stderr"):
-                    log.warning(warning["text"].rstrip())
-                if error:
-                    _store_error(report, error)
-                    continue
-                report.done += 1
-                if progress:
-                    progress(sum(report.done for report in reports), total, report.name)
-        for report in reports:
-            if report.done < len(report.cells) and not report.failure:
-                errors.seek(0)
-                last = errors.read().decode("utf-8", "replace").strip().splitlines()[-1:]
-                report.failure = ": ".join([_describe_cell(report), "its process ended", *last])
+
+    def show(report: Report) -> None:
+        if progress:
+            progress(sum(report.done for report in reports), total, report.name)
+
+    with temporary_folder(Path(gettempdir()), HOME) as home:
+        _wait_for(_run_all([_Run(report, home) for report in reports], show))
 
 
-def _store_error(report: Report, error: dict[str, Any]) -> None:
-    """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
-    if error["refusal"]:
-        raise InputError(*error["refusal"]).within(f"report {report.name}")
-    report.failure = f"{_describe_cell(report)}: {error['text']}"
-    report.traceback = error["traceback"]
+def _wait_for(work: Coroutine[Any, Any, None]) -> None:
+    """Run a coroutine in another thread, and cancel it if this one is interrupted.
+
+    This thread may have a loop of events that runs, such as that of Jupyter.
+    """
+    loop = asyncio.new_event_loop()
+
+    def cancel_all() -> None:
+        for task in asyncio.all_tasks(loop):
+            task.cancel()
+
+    with closing(loop), ThreadPoolExecutor(1) as thread:
+        try:
+            thread.submit(loop.run_until_complete, work).result()
+        except KeyboardInterrupt:
+            loop.call_soon_threadsafe(cancel_all)
+            raise
+
+
+async def _run_all(runs: Sequence["_Run"], show: Callable[[Report], None]) -> None:
+    gate = asyncio.Semaphore(AT_ONCE)
+
+    async def run_in_turn(run: _Run) -> None:
+        async with gate:
+            await run.run_cells(show)
+
+    try:
+        async with asyncio.TaskGroup() as group:
+            for run in runs:
+                group.create_task(run_in_turn(run))
+    except ExceptionGroup as errors:
+        raise errors.exceptions[0] from None
+
+
+class _Run:
+    """A run of a report in a kernel, which writes to the folder ``home`` only."""
+
+    def __init__(self, report: Report, home: Path):
+        self.report = report
+        self.home = home
+        self.errors = home / f"{report.name}.txt"  # what the process reports
+        self.kernel = AsyncKernelManager(
+            kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),  # none but this Python
+            transport="ipc",
+            connection_file=str(home / f"{report.name}.json"),
+        )
+        self.client = NotebookClient(
+            report.notebook,
+            km=self.kernel,
+            startup_timeout=STARTUP,
+            extra_arguments=_OPTIONS,
+            coalesce_streams=True,
+            record_timing=False,
+            store_widget_state=False,
+        )
+
+    async def run_cells(self, show: Callable[[Report], None]) -> None:
+        """Run the cells up to the first that fails; ``show`` is called after each.
+
+        Raises:
+            InputError: If a cell refuses its input.
+        """
+        try:
+            await self._start_kernel()
+            for number, cell in enumerate(self.client.nb.cells):
+                if cell.cell_type == "code":
+                    await self._run_cell(cell, number)
+                    show(self.report)
+        except CellExecutionError as error:
+            self._store_error(error)
+        except RuntimeError:
+            last = self.errors.read_text("utf-8", "replace").strip().splitlines()[-1:]
+            place = _describe_cell(self.report)
+            self.report.failure = ": ".join([place, "its process ended", *last])
+        finally:
+            await self._end_kernel()
+
+    async def _start_kernel(self) -> None:
+        """Start the kernel in a session of its own, which keeps Ctrl-C from it."""
+        environment = _process_environment(self.home)
+        environment[ASKED] = ",".join(self.report.formats)
+        with self.errors.open("wb") as errors:
+            streams = {"stdout": errors, "stderr": errors}
+            await self.client.async_start_new_kernel(cwd=self.home, env=environment, **streams)
+        await self.client.async_start_new_kernel_client()
+
+    async def _run_cell(self, cell: NotebookNode, number: int) -> None:
+        cell.outputs = []
+        await self.client.async_execute_cell(cell, number)
+        cell.outputs = [_without_counter(output) for output in cell.outputs]
+        for warning in (output for output in cell.outputs if output.get("name") == "stderr"):
+            log.warning(warning["text"].rstrip())
+        self.report.done += 1
+
+    async def _end_kernel(self) -> None:
+        """Kill the kernel and its children."""
+        if self.client.kc:
+            self.client.kc.stop_channels()
+        if self.kernel.has_kernel:
+            await self.kernel.shutdown_kernel(now=True)
+
+    def _store_error(self, error: CellExecutionError) -> None:
+        """Store the error of a cell in its report.
+
+        Raises:
+            InputError: If the cell refuses its input.
+        """
+        from nbconvert.filters.ansi import strip_ansi
+
+        if error.ename == InputError.__name__:
+            raise InputError(f"report {self.report.name}", error.evalue) from None
+        self.report.cells[self.report.done].outputs = []
+        self.report.failure = f"{_describe_cell(self.report)}: {error.ename}: {error.evalue}"
+        self.report.traceback = strip_ansi(error.traceback)
+
+
+def _without_counter(output: NotebookNode) -> NotebookNode:
+    """The output of a cell; its last value without the number of the cell."""
+    if output.output_type == "execute_result":
+        return new_output("display_data", output.data, metadata=output.metadata)
+    return output
 
 
 def _describe_cell(report: Report) -> str:
@@ -86,40 +187,8 @@ def _describe_cell(report: Report) -> str:
     return f"report {report.name}: cell {report.done + 1} of {len(report.cells)} ({first_line})"
 
 
-@contextmanager
-def _start_process(
-    home: Path, errors: IO[bytes], formats: Iterable[str]
-) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
-    """Input and output of the process that runs notebooks in a folder; it is killed at the end.
-
-    Its figures are files as well, in some formats.
-
-    A session of its own keeps Ctrl-C from it and its children, and makes them a group to kill.
-    """
-    process = subprocess.Popen(
-        [sys.executable, "-m", cells.__name__],
-        cwd=home,
-        env=_process_environment(home) | {ASKED: ",".join(formats)},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=errors,
-        start_new_session=True,
-    )
-    assert process.stdin
-    assert process.stdout
-    try:
-        yield process.stdin, process.stdout
-    finally:
-        kill_group(process.pid)
-        process.kill()
-        process.wait()
-        for stream in (process.stdin, process.stdout):
-            with suppress(BrokenPipeError):
-                stream.close()
-
-
 def _process_environment(home: Path) -> dict[str, str]:
-    """The environment of a process that writes to ``home`` only.
+    """The environment of a kernel that writes to ``home`` only.
 
     An empty entry of the path means the working directory of this process, where anything may lie.
     """
@@ -136,44 +205,3 @@ def _process_environment(home: Path) -> dict[str, str]:
         "MPLBACKEND": "agg",
         "MPLCONFIGDIR": get_cachedir(),
     }
-
-
-COMPARISON = "comparison"  # the name of the page and of its study
-# The pages that show times of decisions, and their studies.
-TIMED = {COMPARISON: COMPARISON, "planner": "planning", "seas": "seas"}
-
-
-def simulate_missing(
-    pages: Collection[str],
-    results: Path,
-    parameters: Mapping[str, Any],
-    progress: Progress | None = None,
-) -> None:
-    """Simulate the missions that are missing.
-
-    Args:
-        pages: Names of reports; those that need no missions are ignored.
-        results: The folder that contains a results folder per study.
-        parameters: Values for the parameters of the notebooks.
-        progress: Called after every mission.
-
-    Raises:
-        InputError: If results are damaged, a parameter is refused or nothing can be written.
-    """
-    if not {COMPARISON, *TIMED} & {*pages}:
-        return  # what follows takes its time to import
-    from dess.analysis.answers.missions import keep_logs
-    from dess.analysis.answers.policies.decision_times import ensure_decision_times
-    from dess.analysis.answers.policies.pairs import missions_to_draw, pair_missions, pair_of
-
-    def show(done: int, total: int) -> None:
-        if progress:
-            progress(done, total, "missions")
-
-    if COMPARISON in pages:
-        study = load_results(results / COMPARISON)
-        pair = pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
-        drawn = missions_to_draw(pair_missions(study, pair), pair)
-        keep_logs(study, drawn, show)
-    for page in TIMED.keys() & {*pages}:
-        ensure_decision_times(load_results(results / TIMED[page]), show)

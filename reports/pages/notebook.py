@@ -12,13 +12,13 @@ ones (``outside.py``).
 import ast
 import json
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import jupytext
 import nbformat
 from nbformat import NotebookNode
 
@@ -40,14 +40,6 @@ NAMES = tuple(name for names in GROUPS.values() for name in names)
 OTHERS = "Other pages"  # the group of a notebook of another package that names none
 LARGEST = 512 * 2**20  # bytes of a notebook with its outputs
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
-
-# jupytext has a plugin for Jupyter's server, which takes longer to import than the rest of it.
-_UNUSED = {"jupyter_client", "jupyter_server"} - sys.modules.keys()
-sys.modules |= dict.fromkeys(_UNUSED)  # type: ignore[arg-type]
-import jupytext  # noqa: E402
-
-for _name in _UNUSED:
-    del sys.modules[_name]
 
 _HINT = """
 

@@ -2,7 +2,6 @@
 
 import logging
 import os
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -15,10 +14,10 @@ from dess.analysis.results.tables import Results
 from dess.base.commands import command_line
 from dess.base.files.reading import Missing
 from dess.base.files.writing import delete, locked, write_files
-from dess.reports.pages import INDEX, LOCK, check_pages, kernels, notebook
+from dess.reports.pages import INDEX, LOCK, check_pages, missing, notebook
 from dess.reports.pages.finished import find_finished_page
 from dess.reports.pages.index import add_bars, find_pages, make_index
-from dess.reports.pages.kernels import Progress
+from dess.reports.pages.missing import Progress
 from dess.reports.pages.study import make_study_report
 
 log = logging.getLogger(__name__)
@@ -102,7 +101,7 @@ def render(
         report.set_parameters({"results": str(results.absolute()), **values})
     check_pages(out, *(report.name for report in reports))
     changed = [report.name for report in reports if not report.is_current]
-    kernels.simulate_missing(changed, results, values, progress)
+    missing.simulate_missing(changed, results, values, progress)
     _write_pages(reports, results, out, progress, values, left_out)
     return out / INDEX
 
@@ -156,15 +155,13 @@ def _write_pages(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     changed = [report for report in reports if not report.is_current]
-    read_by = Counter(f for report in changed for f in report.results.values())
-    kernels.run_reports(
-        changed, progress, [folder for folder, count in read_by.items() if count > 1]
-    )
     new_pages = {}
     files: dict[str, str | bytes] = {}
     if changed:
-        from dess.reports.pages.body import figure_files, make_page  # imports nbconvert
+        from dess.reports.pages import kernels  # imports Jupyter
+        from dess.reports.pages.body import figure_files, make_page
 
+        kernels.run_reports(changed, progress)
         new_pages = {report.page: make_page(report) for report in changed}
         for report in (report for report in changed if not report.failure):
             pictures = figure_files(report)

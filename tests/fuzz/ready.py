@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dess.analysis import load_study, run_study
 from dess.policies import registry
-from dess.reports.pages import kernels
+from dess.reports.pages import missing
 from dess.reports.pages.notebook import NAMES
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
@@ -76,7 +76,7 @@ def _make_reports(folder: Path) -> None:
         for name, changes in STUDIES.items():
             fewer = {key: min(value, 8) for key, value in changes.items() if key == "missions"}
             run_study(load_study(name, **changes | fewer), folder / name)
-        kernels.simulate_missing(NAMES, folder, {})
+        missing.simulate_missing(NAMES, folder, {})
 
 
 def write_texts(ready: Path) -> None:

@@ -7,7 +7,6 @@ import ast
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import chdir, contextmanager, redirect_stderr
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -18,7 +17,7 @@ from nbformat.v4 import new_output
 
 from dess import InputError
 from dess.reports.pages import figures, kernels, parts
-from dess.reports.pages.kernels import Progress
+from dess.reports.pages.missing import Progress
 from dess.reports.pages.notebook import Report
 from dess.reports.pages.parts import PART, Part
 
@@ -35,9 +34,7 @@ def notebooks_here(is_drawn: bool = False) -> Iterator[None]:
         yield
 
 
-def run_reports(
-    reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
-) -> None:
+def run_reports(reports: Sequence[Report], progress: Progress | None = None) -> None:
     """Run reports, as the function of this name in ``kernels`` does in another process."""
     for report in reports:
         try:
