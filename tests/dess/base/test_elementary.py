@@ -282,7 +282,7 @@ EXCEPTIONS = {
         ("dess/scenario/families.py", "windows.sum((2, 3))"),
         ("dess/scenario/fields.py", "sum(self.zone_pads)"),
         ("policies/choices.py", "cells @ [1, shape[1]]"),
-        ("policies/planner/drawing.py", "crafts['active'].sum()"),
+        ("policies/planner/courses.py", "crafts['active'].sum()"),
     },
     "widths of layers are whole numbers": {
         ("policies/integers.py", "sum(_POOLED)"),

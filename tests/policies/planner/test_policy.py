@@ -99,7 +99,7 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic():
     assert (products["better"] - products["greedy"]).mean() > 0.02
 
 
-# --- drawing ---
+# --- courses ---
 
 
 def test_a_plan_is_drawn_as_it_is_flown():

@@ -1,4 +1,4 @@
-"""The plans that a planner has during a mission, for drawings.
+"""The courses of UAVs that a planner has planned during a mission.
 
 >>> plans = plan_of(load_scenario("paper"), seed=1, replication=0)
 >>> plans[20][0].waypoints[:2]     # of UAV 0, as planned in slot 20; ``path`` has its cells
@@ -94,11 +94,11 @@ class _Watched:
 
     def act(self, view: View) -> np.ndarray:
         actions = self.planner.act(view)
-        self.plans[int(view.constants["slot"][0])] = _draw_courses(view, self.planner)
+        self.plans[int(view.constants["slot"][0])] = _predict_courses(view, self.planner)
         return actions
 
 
-def _draw_courses(view: View, planner: Planner) -> list[Course]:
+def _predict_courses(view: View, planner: Planner) -> list[Course]:
     """The courses of a planner's present plan for the mission of a view."""
     state = view.state
     part, _ = next(view.rows_by(RATES_PART))
@@ -118,12 +118,12 @@ def _draw_courses(view: View, planner: Planner) -> list[Course]:
             break
         crafts.append(flight.team[flight.last[0]].copy())
     return [
-        _draw_course(plan.waypoints[i, : plan.lengths[i]], np.stack(crafts)[:, i])
+        _course_of(plan.waypoints[i, : plan.lengths[i]], np.stack(crafts)[:, i])
         for i in range(mission["uavs"])
     ]
 
 
-def _draw_course(waypoints: np.ndarray, crafts: np.ndarray) -> Course:
+def _course_of(waypoints: np.ndarray, crafts: np.ndarray) -> Course:
     """The course of a UAV from its waypoints and its states in all slots."""
     cells = np.stack([crafts["x"], crafts["y"]], 1)
     slots = int(crafts["active"].sum())  # it is active until its last slot
