@@ -22,7 +22,8 @@ from dess.analysis.answers.settings.points import points_in_words
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, REWARD
 from dess.analysis.results.provenance import differing_modules
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import Paired, add_adjusted, compare, compare_unpaired
+from dess.analysis.stats.corrections import add_adjusted
+from dess.analysis.stats.differences import Paired, compare, compare_unpaired
 from dess.analysis.stats.rows import group_rows
 from dess.base.errors import shown
 from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD

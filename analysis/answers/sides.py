@@ -29,7 +29,8 @@ from dess.analysis.metrics import (
     in_either,
 )
 from dess.analysis.results.tables import Results, compute_once
-from dess.analysis.stats.differences import add_adjusted, compare
+from dess.analysis.stats.corrections import add_adjusted
+from dess.analysis.stats.differences import compare
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.weights import by_replication
 

@@ -25,14 +25,8 @@ from dess.analysis.names import field_named
 from dess.analysis.results.resimulate import LoggedMission, resimulate
 from dess.analysis.results.tables import Results, compute_once
 from dess.analysis.sheet import node_titles
-from dess.analysis.stats.differences import (
-    Paired,
-    compare,
-    compare_pairs,
-    differences_of,
-    for_choice,
-    t_test,
-)
+from dess.analysis.stats.corrections import for_choice
+from dess.analysis.stats.differences import Paired, compare, compare_pairs, differences_of, t_test
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.rows import group_rows
 from dess.analysis.stats.verdict import (

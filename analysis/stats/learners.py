@@ -14,24 +14,25 @@ import scipy
 
 from dess import InputError
 from dess.analysis.metrics import Metric, metric_group
+from dess.analysis.stats.corrections import Correction, add_adjusted
 from dess.analysis.stats.differences import (
-    Correction,
-    add_adjusted,
     add_rare_pairs,
-    check_same_missions,
     difference_test,
     differences_of,
-    group_key,
-    match_groups,
-    metrics_by_group,
-    metrics_by_treatment,
     range_of_difference,
     rare_differences,
-    select_table,
     sign_test,
     t_test,
 )
 from dess.analysis.stats.kinds import LEVEL
+from dess.analysis.stats.matching import (
+    check_same_missions,
+    group_key,
+    match_groups,
+    metrics_by_group,
+    metrics_by_treatment,
+    select_table,
+)
 from dess.analysis.stats.rows import check_share
 
 # What a comparison is about: all trainings of the learner, or the only one that there is.
@@ -138,7 +139,7 @@ def compare_learners(
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
         correction: Correction of the p-values over all rows, as for
-            ``differences.adjust_p_values``.
+            ``corrections.adjust_p_values``.
 
     Returns:
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,

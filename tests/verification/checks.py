@@ -14,7 +14,7 @@ import pandas as pd
 from scipy import stats
 
 from dess.analysis import numbers
-from dess.analysis.stats.differences import adjust_p_values
+from dess.analysis.stats.corrections import adjust_p_values
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 

@@ -6,11 +6,8 @@ from dess.analysis.answers.policies.ranks import best_policy, rank_learned_and_o
 from dess.analysis.metrics import METRICS, PRODUCT, metric_of
 from dess.analysis.results.learners import trained_policies_by_learner
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import (
-    P_VALUES,
-    compare,
-    insert_adjusted,
-)
+from dess.analysis.stats.corrections import P_VALUES, insert_adjusted
+from dess.analysis.stats.differences import compare
 from dess.analysis.stats.learners import compare_learners
 from dess.analysis.tables import (
     INTERVALS,

@@ -12,7 +12,8 @@ from dess.analysis.answers.policies.pairs import COLOURS, OF_BASELINE, Pair
 from dess.analysis.figures import Drawing, style
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import PARAMETERS, field_named, value_text
-from dess.analysis.stats.differences import add_adjusted, compare_pairs, for_choice
+from dess.analysis.stats.corrections import add_adjusted, for_choice
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.verdict import (
     BETTER,
     INCONCLUSIVE,

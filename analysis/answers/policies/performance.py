@@ -10,9 +10,7 @@ from dess.analysis.answers.summary import means_of_points
 from dess.analysis.figures import Drawing, name_best_mean
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, SUCCESS, metric_of
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import (
-    difference_of_intervals,
-)
+from dess.analysis.stats.differences import difference_of_intervals
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import MARKS, position_of
 from dess.analysis.tables import (

@@ -17,7 +17,8 @@ from dess.analysis.measured import check_metric
 from dess.analysis.metric_ranges import metric_in_groups
 from dess.analysis.metrics import METRICS, metric_of
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import add_adjusted, column_tests
+from dess.analysis.stats.corrections import add_adjusted
+from dess.analysis.stats.differences import column_tests
 from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.weights import by_replication
 from dess.analysis.tables import (

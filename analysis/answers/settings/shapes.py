@@ -19,7 +19,8 @@ from dess.analysis.answers.settings.points import ordered_values
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.names import field_named
 from dess.analysis.results.tables import Results
-from dess.analysis.stats.differences import add_adjusted, compare_pairs
+from dess.analysis.stats.corrections import add_adjusted
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.weights import by_replication
 

@@ -12,7 +12,7 @@ from dess.analysis import numbers
 from dess.analysis.answers.training.curves import BASELINE, SHIPPED
 from dess.analysis.figures import Drawing
 from dess.analysis.metrics import METRICS, PRODUCT, RATIO, SUCCESS
-from dess.analysis.stats.differences import add_adjusted
+from dess.analysis.stats.corrections import add_adjusted
 from dess.analysis.stats.intervals import Interval, mean_interval
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import MARKS, position_of

@@ -38,7 +38,7 @@ from dess.analysis.answers.policies.parameter_bins import (
 )
 from dess.analysis.metrics import METRICS, PRODUCT
 from dess.analysis.names import PARAMETERS
-from dess.analysis.stats.differences import adjust_p_values
+from dess.analysis.stats.corrections import adjust_p_values
 from dess.analysis.stats.verdict import BETTER, INCONCLUSIVE, WORSE
 from tests.analysis.small import grid, small_study
 

@@ -15,7 +15,8 @@ from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.sides import BASELINE, VARIATION
 from dess.analysis.answers.variation import Variation, format_change
 from dess.analysis.metrics import PRODUCT, SUCCESS
-from dess.analysis.stats.differences import adjust_p_values, compare_pairs
+from dess.analysis.stats.corrections import adjust_p_values
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.kinds import LEVEL
 from dess.analysis.stats.verdict import (
     ABOVE,

@@ -5,7 +5,8 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from dess import InputError
-from dess.analysis.stats.differences import adjust_p_values, compare
+from dess.analysis.stats.corrections import adjust_p_values
+from dess.analysis.stats.differences import compare
 from dess.analysis.stats.intervals import mean_interval
 from dess.analysis.stats.learners import compare_crossed, compare_learners
 from tests.analysis.stats.test_differences import METRIC, STUDY, ratios, rng

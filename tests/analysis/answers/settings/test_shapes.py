@@ -12,7 +12,8 @@ from dess.analysis.answers.settings import effects, shapes
 from dess.analysis.answers.settings.shapes import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from dess.analysis.answers.summary import means_of_points
 from dess.analysis.metrics import PRODUCT, SUCCESS
-from dess.analysis.stats.differences import adjust_p_values, compare_pairs
+from dess.analysis.stats.corrections import adjust_p_values
+from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.weights import by_replication
 from tests.analysis.small import grid
 
