@@ -297,6 +297,7 @@ ORACLES = {
         "tests/dess/model/test_engines.py",
         "tests/dess/model/test_randomness.py",
         "tests/dess/model/test_ties.py",
+        "tests/dess/physics/test_energy.py",
         "tests/dess/physics/test_fleet.py",
         "tests/analysis/results/test_event_log.py",
     ),

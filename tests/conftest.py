@@ -43,6 +43,8 @@ COMPILING += ("policies/learner/test_session.py", "policies/planner/test_policy.
 # Some that compile little, until what the last ones need of others is compiled.
 COMPILING += ("analysis/execution", "analysis/test_coverage.py", "reports/pages/test_render.py")
 COMPILING += ("policies/learner/test_policy.py", "dess/envs/observations/test_states.py")
+# Of files that compile the same and would be run at the same time, one comes early.
+COMPILING += ("dess/model/guard/test_guard.py", "dess/envs/test_parallel.py")
 # Files that take longest; they come next, so that workers end together.
 LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")
 LONGEST += ("test_extras.py",)

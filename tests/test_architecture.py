@@ -132,11 +132,12 @@ def place_of(module: str) -> list[str]:
     return parts[1:] if parts[0] == "dess" and parts[1:] and parts[1] in FLOORS else parts
 
 
-SOURCES = {
-    module_name(path): ast.parse(path.read_text("utf-8"), str(path))
+TEXTS = {
+    module_name(path): path.read_text("utf-8")
     for floor in FLOORS
     for path in sorted((ROOT / floor).rglob("*.py"))
 }
+SOURCES = {name: ast.parse(text, name) for name, text in TEXTS.items()}
 # Notebooks document themselves in their cells.
 LIBRARY = {name: tree for name, tree in SOURCES.items() if ".notebooks." not in name}
 NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").rglob("*.py"))

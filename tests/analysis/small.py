@@ -96,6 +96,15 @@ def small_study(folder: Path, **changes: Any) -> Study:
     return load_study(path, **changes)
 
 
+# Missions of a chunk of the study that is divided into shards.
+CHUNK_SIZE = 9
+
+
+def divided_study(folder: Path) -> Study:
+    """A study of seven chunks of missions, and as many of event logs and bounds."""
+    return small_study(folder, design=grid(uavs=[1, 2, 3]), logged=1)
+
+
 def asked(folder: Path, missions: int = 12, **changes: Any) -> VariationAnswer:
     """The answer to a question about the small scenario: six UAVs at a single pad, not two."""
     values = {

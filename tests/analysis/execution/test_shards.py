@@ -17,19 +17,6 @@ from tests.analysis.small import files_of, grid, small_study
 FOUR = [Shard(number, 4) for number in (1, 2, 3, 4)]
 
 
-@pytest.fixture
-def study(tmp_path, monkeypatch):
-    """A study of seven chunks of missions, and as many of event logs and bounds."""
-    monkeypatch.setitem(CHUNK, "batch", 9)
-    return small_study(tmp_path, design=grid(uavs=[1, 2, 3]), logged=1)
-
-
-@pytest.fixture
-def expected(study, tmp_path):
-    run_study(study, tmp_path / "whole")
-    return files_of(tmp_path / "whole")
-
-
 def test_shards_of_one_folder_leave_the_bytes_of_a_single_run(study, expected, tmp_path):
     folder = tmp_path / "shared"
     for shard in [*FOUR[::-1], Shard(2, 3)]:  # in any order, and some chunks twice

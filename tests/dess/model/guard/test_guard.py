@@ -196,6 +196,22 @@ def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(sea)
     assert not dry[records.missions["uavs"] == 1].any()
 
 
+@pytest.mark.parametrize(
+    ("slots_left", "quota", "moves"),
+    [(17, 0, [*range(5)]), (16, 0, [HOVER]), (16, 440, [*range(5)])],
+)
+def test_shortly_before_the_end_a_charged_uav_does_not_leave_a_zone(slots_left, quota, moves):
+    """It could fly a slot and be back in time, but teammates count on it to stay.
+
+    With a quota, it goes on until that is filled.
+    """
+    charged = {"x": 27, "y": 4, "battery": 90}
+    state, chart = placed([charged], landing=True, quota=quota)
+    state.missions["slot"] = state.missions["max_slots"] - slots_left
+    view = View(state, SimpleNamespace(chart=chart), np.zeros(1, int), np.zeros(1, int))
+    assert np.nonzero(guard(view)[0])[0].tolist() == moves
+
+
 # --- pads ---
 
 QUEUE: dict[str, Any] = {"charge_start": 30, "charge_complete": 80, "pads": 1}
