@@ -11,7 +11,6 @@ from dess import InputError
 # Of a comparison: with what is added for rare failures, and of Student's t without it.
 P_VALUES = ("p", "p_student")
 
-
 Correction = Literal["holm", "fdr"]
 
 

@@ -14,7 +14,6 @@ from dess.analysis.stats.weights import values_within
 
 Treatment = Literal["policy", "point"]
 
-
 _MISSION = ("policy", "point", "seed", "replication")  # what identifies a mission
 
 

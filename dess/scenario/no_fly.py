@@ -12,14 +12,9 @@ closes cells, also those outside of what UAVs are kept in.
 """
 
 import io
-import logging
-import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from contextvars import ContextVar
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -30,32 +25,19 @@ from dess.base.libraries import absence, needs
 from dess.physics.chart import Rectangle
 from dess.physics.section import Number
 from dess.scenario import places
+from dess.scenario.extents import MOST_METRES, lies_elsewhere, radii_of, radius_of, unread_names
+from dess.scenario.notes import tell
 from dess.scenario.places import Place, Projection, Size
-from dess.scenario.quantities import quantity_of
+from dess.scenario.polygons import border_within, centres_in, lie_in
 
 # The letters of maps, those of the MAPF benchmark among them: trees and water are closed.
 CLOSED, FREE = "#@OTW", ".GS"
 _MAPF = CLOSED[1:] + FREE
-MOST_METRES = 10**6  # of a width, a buffer or a radius
 # How far beyond itself a point or a line touches a cell [cells]: it may lie on an edge, which the
 # rounding of a projection puts on either side.
 _HAIR = 1e-6
 
 _REMEDY = "touched = true closes all cells that they touch"
-
-# What a place says of its extent, by the last word of a property: its radius, perhaps with a unit
-# as in "Radius (km)"; what is not read; from and up to which altitude it reaches.
-_RADIUS = re.compile(r"radius[ _.-]*[(\[]?([a-z]*)[)\]]?", re.IGNORECASE)
-_UNREAD = re.compile(
-    "radius|diameter|width|buffer|wkt|polygon|ellipse|semi.?(?:major|minor)|(?<![a-z])range|extent",
-    re.IGNORECASE,
-)
-_LOWER = re.compile(r"lower|floor|min_?alt", re.IGNORECASE)
-_UPPER = re.compile(r"upper|ceil|max_?alt", re.IGNORECASE)
-_OF_A_LIMIT = re.compile(r"ref|datum|unit|uom", re.IGNORECASE)
-_UNIT = re.compile(r"unit|uom", re.IGNORECASE)
-# In hundreds of feet, as FL100 or as 100 with the unit FL.
-_FLIGHT_LEVEL = re.compile(r"FL ?([0-9]{1,3})|([0-9]{1,3}) FL", re.IGNORECASE)
 
 
 class NoFlyFile(places.Source):
@@ -213,7 +195,7 @@ def _of_places(
     if is_geographic and projection:
         return _of_degrees(path, chosen, projection, source, altitude)
     _tell_unused(path, source, "a table of cells", "file", "where")
-    if any(_radii(place) for place in chosen):
+    if any(radii_of(place) for place in chosen):
         _note(f"{path}: the column radius is not used, since its places are cells and no degrees")
     closed = np.zeros(size[::-1], np.bool_)
     for place in chosen:
@@ -236,10 +218,10 @@ def _of_degrees(
     unseen = []
     elsewhere = []
     for place in chosen:
-        cells, is_near = _cells_of(place, projection, source, _radius(place, path))
+        cells, is_near = _cells_of(place, projection, source, radius_of(place, path))
         if is_near and not cells.any():
             unseen.append(place.where)
-        if cells.any() and _lies_elsewhere(place, altitude):
+        if cells.any() and lies_elsewhere(place, altitude):
             elsewhere.append(place.where)
         closed |= cells
     if unseen:
@@ -256,131 +238,14 @@ def _of_degrees(
         names = listed(elsewhere)
         problem = f"lie above or below the UAVs, {altitude:g} m high, and close their cells"
         _note(f"{path}: by their limits of altitude {names} {problem}; where leaves them out")
-    unread = {name for place in chosen for name in _unread_names(place)}
+    unread = {name for place in chosen for name in unread_names(place)}
     if unread:
         _note(f"{path}: {listed(sorted(unread))} of its places is not read; width and buffer are")
     return closed
 
 
-# Notes that are kept until a scenario is known to be valid: a refusal is told alone.
-_held: ContextVar[list[str] | None] = ContextVar("held", default=None)
-
-
-@contextmanager
-def notes_after() -> Iterator[None]:
-    """Tell the notes of a block at its end, and none if it raises an error."""
-    token = _held.set([])
-    try:
-        yield
-        notes = _held.get() or []
-    finally:
-        _held.reset(token)
-    for line in notes:
-        tell(line)
-
-
 def _note(line: str) -> None:
     tell(f"no_fly: {line}")
-
-
-def tell(line: str) -> None:
-    """Tell once what a user should know, or keep it for the end of ``notes_after``."""
-    notes = _held.get()
-    if notes is None:
-        _tell_once(line)
-    else:
-        notes.append(line)
-
-
-@cache
-def _tell_once(line: str) -> None:
-    logging.getLogger(__name__).warning("note: %s", line)
-
-
-def _statements(values: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, Any]]:
-    """The properties of a place that are not empty, those of tables in them dotted."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _statements(value, f"{within}{name}.")
-        elif value not in (None, ""):
-            yield f"{within}{name}", value
-
-
-def _radii(place: Place) -> dict[str, str]:
-    """The radii of a circle, with their units, by the names of the properties that say them."""
-    radii = {}
-    for name, value in _statements(place.properties):
-        match = _RADIUS.fullmatch(name.rpartition(".")[2])
-        if match:
-            text = str(value).strip()
-            if not text[-1:].isalpha():
-                unit = match[1].lower() or "m"
-                text = f"{text} {'NM' if unit == 'nm' else unit}"
-            radii[name] = text
-    return radii
-
-
-def _radius(place: Place, path: Path) -> float:
-    """The radius of a circle [m], the largest that it has; 0 without one.
-
-    Raises:
-        InputError: If it is none.
-    """
-    largest = 0.0
-    for name, text in _radii(place).items():
-        if _has_points(place):
-            where = f"{path}: {place.where}: {name}"
-            radius = quantity_of(text, where, "m")
-            if not 0 <= radius <= MOST_METRES:
-                allowed = f"metres from 0 to {MOST_METRES:,}, or a distance with its unit"
-                raise InputError(where, f"{shown(text)} is out of range", allowed)
-            largest = max(largest, radius)
-    return largest
-
-
-def _has_points(place: Place) -> bool:
-    return any(kind == places.POINT for kind, _ in place.shapes)
-
-
-def _unread_names(place: Place) -> list[str]:
-    """The properties of a place that seem to say how far it reaches, and are not read."""
-    radii = _radii(place)
-    if not _has_points(place):
-        radii = {}
-    return [
-        name
-        for name, _ in _statements(place.properties)
-        if _UNREAD.search(name.rpartition(".")[2]) and name not in radii
-    ]
-
-
-def _lies_elsewhere(place: Place, altitude: float) -> bool:
-    """Whether a place begins above an altitude [m], or ends below it."""
-    lower = _limits(place, _LOWER)
-    upper = [limit for limit in _limits(place, _UPPER) if limit > 0]  # 0 is often for none
-    return max(lower, default=0.0) > altitude or min(upper, default=altitude) < altitude
-
-
-def _limits(place: Place, kind: re.Pattern[str]) -> list[float]:
-    """The limits of altitude of a kind that a place has [m]; without a unit they are metres."""
-    limits = []
-    statements = dict(_statements(place.properties))
-    for name, value in statements.items():
-        table, _, word = name.rpartition(".")
-        if not kind.search(name) or _OF_A_LIMIT.search(word):
-            continue
-        text = str(value).strip()
-        if not text[-1:].isalpha() and not _FLIGHT_LEVEL.fullmatch(text):
-            beside = [n for n in statements if n.rpartition(".")[0] == table and _UNIT.search(n)]
-            beside.sort(key=lambda other: not kind.search(other))  # its own unit, if it has one
-            units = [str(statements[other]).lower() for other in beside]
-            text = f"{text} {next(filter(str.isalpha, units), 'm')}"
-        level = _FLIGHT_LEVEL.fullmatch(text)
-        if level:
-            text = f"{level[1] or level[2]}00 ft"
-        with suppress(InputError):  # a word, such as that for the surface of the sea
-            limits.append(quantity_of(text, name, "m"))
-    return limits
 
 
 def _cells_of(
@@ -412,7 +277,7 @@ def _cells_of(
             beyond = margin + _HAIR
             if (high + beyond < 0).any() or (low - beyond >= size).any():
                 continue
-            is_near |= len(turned) == 1 or len(_border_within(turned, size)) > 0
+            is_near |= len(turned) == 1 or len(border_within(turned, size)) > 0
             if kind == places.POINT:
                 closed |= _cells_at(turned[0][0], size)
                 if not reach:
@@ -434,30 +299,10 @@ def _has_gaps(place: Place, projection: Projection, beside: np.ndarray) -> bool:
     """
     for kind, rings in place.shapes:
         for turned in projection.shapes(rings) if kind == places.POLYGON else ():
-            x, y = _border_within(turned, projection.size).T
+            x, y = border_within(turned, projection.size).T
             if not beside[y, x].all():
                 return True
     return False
-
-
-def _border_within(rings: list[np.ndarray], size: Size) -> np.ndarray:
-    """(K, 2) the cells along rings, without those at the rim of the grid, beyond which is land."""
-    cells = np.concatenate([_border_of(ring, size) for ring in rings])
-    return cells[((cells > 0) & (cells < np.array(size) - 1)).all(1)]
-
-
-def _border_of(ring: np.ndarray, size: Size) -> np.ndarray:
-    """(K, 2) the cells along a ring, of its edges that may be on the grid."""
-    low = np.minimum(ring[:-1], ring[1:])
-    high = np.maximum(ring[:-1], ring[1:])
-    is_near = ((low < size) & (high > 0)).all(1)
-    starts = ring[:-1][is_near]
-    steps = np.diff(ring, axis=0)[is_near]
-    counts = np.ceil(2 * np.abs(steps)).astype(int).max(1, initial=1)  # at every half of a cell
-    edges = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    shares = (np.arange(len(edges)) - first[edges]) / counts[edges]
-    return np.floor(starts[edges] + shares[:, None] * steps[edges]).astype(int)
 
 
 def _cells_at(spot: np.ndarray, size: Size) -> np.ndarray:
@@ -500,28 +345,6 @@ def _covered(
     return covered
 
 
-def centres_in(rings: list[np.ndarray], size: Size) -> np.ndarray:
-    """(H, W) whether the centre of a cell lies in a polygon, by the even-odd rule.
-
-    A ray from the centre to the west crosses the rings an odd number of times.
-
-    Args:
-        rings: The outer ring and the holes, (K, 2) places on the grid [cells] each, closed.
-        size: Cells of the grid from west to east and from north to south.
-    """
-    starts = np.concatenate([ring[:-1] for ring in rings])
-    ends = np.concatenate([ring[1:] for ring in rings])
-    inside = np.zeros(size[::-1], np.bool_)
-    for row in range(size[1]):
-        y = row + 0.5
-        crosses = (starts[:, 1] <= y) != (ends[:, 1] <= y)
-        x0, y0 = starts[crosses].T
-        x1, y1 = ends[crosses].T
-        crossings = np.sort(x0 + (y - y0) * (x1 - x0) / (y1 - y0))
-        inside[row] = np.searchsorted(crossings, np.arange(size[0]) + 0.5) % 2 == 1
-    return inside
-
-
 def polygons_hold(
     path: Path, projection: Projection, source: NoFlyFile, spots: np.ndarray
 ) -> np.ndarray:
@@ -542,20 +365,7 @@ def polygons_hold(
     for place in source.chosen(places.read_places(path).places, path):
         for kind, rings in place.shapes:
             for turned in projection.shapes(rings) if kind == places.POLYGON else ():
-                is_held |= _lie_in(turned, spots)
-    return is_held
-
-
-def _lie_in(rings: list[np.ndarray], spots: np.ndarray) -> np.ndarray:
-    """(K,) whether (K, 2) places lie in a polygon, by the even-odd rule as in ``centres_in``."""
-    x0, y0 = np.concatenate([ring[:-1] for ring in rings]).T
-    x1, y1 = np.concatenate([ring[1:] for ring in rings]).T
-    is_held = np.zeros(len(spots), np.bool_)
-    for number, (x, y) in enumerate(spots):
-        crosses = (y0 <= y) != (y1 <= y)
-        shares = (y - y0[crosses]) / (y1 - y0)[crosses]
-        crossings = x0[crosses] + shares * (x1 - x0)[crosses]
-        is_held[number] = np.count_nonzero(crossings < x) % 2 == 1
+                is_held |= lie_in(turned, spots)
     return is_held
 
 

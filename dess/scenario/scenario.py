@@ -59,8 +59,8 @@ from dess.scenario.fields import (
     is_number,
     merged,
 )
-from dess.scenario.no_fly import notes_after, tell
 from dess.scenario.nodes import AMOUNTS
+from dess.scenario.notes import notes_after, tell
 from dess.scenario.own_sea import OwnSea, Positions, unread
 from dess.scenario.weather import REPLACED, Weather, in_weather
 

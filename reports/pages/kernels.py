@@ -168,7 +168,8 @@ class _Run:
         from nbconvert.filters.ansi import strip_ansi
 
         if error.ename == InputError.__name__:
-            raise InputError(f"report {self.report.name}", error.evalue) from None
+            problem, _, allowed = error.evalue.partition("; allowed: ")
+            raise InputError(f"report {self.report.name}", problem, allowed) from None
         self.report.cells[self.report.done].outputs = []
         self.report.failure = f"{_describe_cell(self.report)}: {error.ename}: {error.evalue}"
         self.report.traceback = strip_ansi(error.traceback)

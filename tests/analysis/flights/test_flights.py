@@ -24,7 +24,7 @@ from dess.analysis.flights.route import Craft, Moment, Place
 from dess.analysis.flights.separation import Separation, Track, closest_approach
 from dess.model.state import sample_scenario
 from dess.physics.chart import NO_FLY
-from dess.scenario.no_fly import centres_in
+from dess.scenario.polygons import centres_in
 from dess.scenario.rotary_wing import RotaryWing
 from dess.scenario.scenario import Scenario, ScenarioSpace, positions_in
 from tests.analysis.flights.hand import (
