@@ -11,8 +11,8 @@ from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from tempfile import gettempdir
-from typing import Any
+from tempfile import TemporaryFile, gettempdir
+from typing import IO, Any
 
 from jupyter_client.kernelspec import KernelSpecManager
 from jupyter_client.manager import AsyncKernelManager
@@ -98,7 +98,6 @@ class _Run:
     def __init__(self, report: Report, home: Path):
         self.report = report
         self.home = home
-        self.errors = home / f"{report.name}.txt"  # what the process reports
         self.kernel = AsyncKernelManager(
             kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),  # none but this Python
             transport="ipc",
@@ -120,28 +119,33 @@ class _Run:
         Raises:
             InputError: If a cell refuses its input.
         """
-        try:
-            await self._start_kernel()
-            for number, cell in enumerate(self.client.nb.cells):
-                if cell.cell_type == "code":
-                    await self._run_cell(cell, number)
-                    show(self.report)
-        except CellExecutionError as error:
-            self._store_error(error)
-        except RuntimeError:
-            last = self.errors.read_text("utf-8", "replace").strip().splitlines()[-1:]
-            place = _describe_cell(self.report)
-            self.report.failure = ": ".join([place, "its process ended", *last])
-        finally:
-            await self._end_kernel()
+        with TemporaryFile() as errors:
+            try:
+                await self._start_kernel(errors)
+                for number, cell in enumerate(self.client.nb.cells):
+                    if cell.cell_type == "code":
+                        await self._run_cell(cell, number)
+                        show(self.report)
+            except CellExecutionError as error:
+                self._store_error(error)
+            except RuntimeError:
+                errors.seek(0)
+                last = errors.read().decode("utf-8", "replace").strip().splitlines()[-1:]
+                place = _describe_cell(self.report)
+                self.report.failure = ": ".join([place, "its process ended", *last])
+            finally:
+                await self._end_kernel()
 
-    async def _start_kernel(self) -> None:
-        """Start the kernel in a session of its own, which keeps Ctrl-C from it."""
+    async def _start_kernel(self, errors: IO[bytes]) -> None:
+        """Start the kernel in a session of its own, which keeps Ctrl-C from it.
+
+        Args:
+            errors: What the process reports is written to it.
+        """
         environment = _process_environment(self.home)
         environment[ASKED] = ",".join(self.report.formats)
-        with self.errors.open("wb") as errors:
-            streams = {"stdout": errors, "stderr": errors}
-            await self.client.async_start_new_kernel(cwd=self.home, env=environment, **streams)
+        streams = {"stdout": errors, "stderr": errors}
+        await self.client.async_start_new_kernel(cwd=self.home, env=environment, **streams)
         await self.client.async_start_new_kernel_client()
 
     async def _run_cell(self, cell: NotebookNode, number: int) -> None:
