@@ -33,6 +33,8 @@ log = logging.getLogger(__name__)
 AT_ONCE = 2
 STARTUP = 600  # for which a kernel is waited for on a busy machine [s]
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
+# The path of a socket may have 104 characters, of which those in ``HOME`` need some 30.
+LONGEST = 70
 PACKAGES = Path(dess.__file__).parents[1]  # the folder from which this package was imported
 # What a library writes to the streams of the process is no output of a cell.
 _OPTIONS = ["--IPKernelApp.capture_fd_output=False", "--InteractiveShell.colors=nocolor"]
@@ -54,8 +56,17 @@ def run_reports(reports: Sequence[Report], progress: Progress | None = None) -> 
         if progress:
             progress(sum(report.done for report in reports), total, report.name)
 
-    with temporary_folder(Path(gettempdir()), HOME) as home:
-        _wait_for(_run_all([_Run(report, home) for report in reports], show))
+    with temporary_folder(_parent_of_sockets(), HOME) as home:
+        runs = [
+            _Run(report, home, home / f"{number}.json") for number, report in enumerate(reports)
+        ]
+        _wait_for(_run_all(runs, show))
+
+
+def _parent_of_sockets() -> Path:
+    """The folder for temporary files; ``/tmp`` if its path is too long for a socket in it."""
+    folder = gettempdir()
+    return Path(folder if len(os.fsencode(folder)) <= LONGEST else "/tmp")  # noqa: S108 - see above
 
 
 def _wait_for(work: Coroutine[Any, Any, None]) -> None:
@@ -93,15 +104,18 @@ async def _run_all(runs: Sequence["_Run"], show: Callable[[Report], None]) -> No
 
 
 class _Run:
-    """A run of a report in a kernel, which writes to the folder ``home`` only."""
+    """A run of a report in a kernel, which writes to the folder ``home`` only.
 
-    def __init__(self, report: Report, home: Path):
+    The sockets of the kernel stand beside ``file``, which has their names.
+    """
+
+    def __init__(self, report: Report, home: Path, file: Path):
         self.report = report
         self.home = home
         self.kernel = AsyncKernelManager(
             kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),  # none but this Python
             transport="ipc",
-            connection_file=str(home / f"{report.name}.json"),
+            connection_file=str(file),
         )
         self.client = NotebookClient(
             report.notebook,

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -372,8 +373,14 @@ def test_the_notebook_of_every_shipped_report_is_known_again(tmp_path):
 def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
     results, tmp_path, monkeypatch, capfd
 ):
-    """What a process reports before it dies is part of the line; the others are rendered."""
+    """What a process reports before it dies is part of the line; the others are rendered.
+
+    So it is where the folder for temporary files has a long path.
+    """
     (tmp_path / "mission.html").write_text("before")
+    long = tmp_path / ("x" * 100)  # too long for the path of a socket
+    long.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(long))
     working = FAILING.replace("raise ArithmeticError", "print")
     dying = FAILING.replace("raise", r"import os; os.write(2, b'one\nmemory\n'); os._exit(1) #")
     sources = {"mission": FAILING, "learning": dying, "performance": working}
