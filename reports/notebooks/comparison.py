@@ -21,7 +21,7 @@ heuristic = None  # the policy to compare it with; None for the best that is not
 # %%
 from IPython.display import display
 
-from dess.analysis import load_results, tables
+from dess.analysis import load_results
 from dess.analysis.answers import missions as logged
 from dess.analysis.answers import summary
 from dess.analysis.answers.policies import comparisons
@@ -111,16 +111,9 @@ make_gallery(
 # only.
 
 # %%
-found = {
-    pairing_sentence(comparison): comparison,
-    "every learner and the best heuristic": comparisons.compare_learned_with_heuristic(study),
-    "every policy and the best one": comparisons.compare_with_best(study),
-}
-for caption, rows in found.items():
-    if len(rows):
-        shown = tables.comparison_cells(rows, rows.columns[0])
-        of = f"Points ahead of {rows['baseline'].iloc[0]} in n = {len(missions):,} missions"
-        display(make_table(shown, f"{of}; {caption}. {tables.MARKED}, by p", data=rows))
+pairing = pairing_sentence(comparison)
+for table in comparisons.all_comparison_tables(study, comparison, pairing, len(missions)):
+    display(make_table(*table))
 write_markdown(
     "{correction} {why} {weights}",
     correction=comparisons.correction_in_words(study),

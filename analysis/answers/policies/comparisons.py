@@ -112,6 +112,34 @@ def _difference_table(results: Results, rows: pd.DataFrame, of: str, caption: st
     return Table(comparison_cells(rows, of), caption, rows)
 
 
+def all_comparison_tables(
+    results: Results, pair: pd.DataFrame, pairing: str, missions: int
+) -> list[Table]:
+    """The differences of a pair, of learners and of all policies, as far as the study has them.
+
+    Args:
+        results: The study.
+        pair: Rows of ``pairs.compare_pair``.
+        pairing: What is compared in them.
+        missions: The number of missions of a policy.
+    """
+    found = {
+        pairing: pair,
+        "every learner and the best heuristic": compare_learned_with_heuristic(results),
+        "every policy and the best one": compare_with_best(results),
+    }
+    return [
+        Table(
+            comparison_cells(rows, rows.columns[0]),
+            f"Points ahead of {rows['baseline'].iloc[0]} in n = {missions:,} missions; "
+            f"{what}. {MARKED}, by p",
+            rows,
+        )
+        for what, rows in found.items()
+        if len(rows)
+    ]
+
+
 def allowance_for_difference(rows: pd.DataFrame, of: str, metric: str = PRODUCT) -> str:
     """Why the intervals of differences are wider than the missions alone would make them.
 

@@ -32,6 +32,7 @@ FEW = 3  # fewer years tell nothing of others
 _NAMED = 5  # of more years, only the first and the last are named
 _DIGITS = 2  # of the ages in a headline
 _AGE_OF_MONTH = "age_h"  # the mean over the years in the table of a calendar
+_NODES = f"{NODE_AGES}_{metric_of(AGE).sheet_unit}"  # the column with the mean ages of the nodes
 _YOUNGEST, _OLDEST = "age_h_least", "age_h_most"  # of one of the years
 
 
@@ -55,7 +56,7 @@ def years_of_setting(results: Results, policy: str, point: int) -> pd.DataFrame:
     uavs = results.uavs
     uavs = uavs[(uavs["policy"] == policy) & (uavs["point"] == point)]
     lost = uavs.groupby("replication")["down"].sum()
-    names = ["open", "windows", "longest_gap", _age_column(results), "late", _nodes_column(results)]
+    names = ["open", "windows", "longest_gap", _age_column(results), "late", _NODES]
     table = rows[["replication", *names]].assign(lost=rows["replication"].map(lost))
     of_replications = years_of(results.scenario(point), results.store.manifest.seed)
     table.insert(0, "year", [of_replications[r].year for r in table["replication"]])
@@ -141,7 +142,7 @@ def year_table(results: Results, policy: str, point: int) -> Table:
     """
     table = years_of_setting(results, policy, point)
     age = metric_of(_age_column(results))
-    means = table.drop(columns=_nodes_column(results)).mean()
+    means = table.drop(columns=_NODES).mean()
     shown = pd.concat([table, means.to_frame().T], ignore_index=True)
     cells = {
         "Year": [*table["year"].astype(str), "mean"],
@@ -157,7 +158,7 @@ def year_table(results: Results, policy: str, point: int) -> Table:
         "The years of the answer. Open hours are a share of those in which UAVs operate; a gap is "
         f"a time without a window; late data are on land more than {due} after they were made"
     )
-    return Table(pd.DataFrame(cells), caption, table.drop(columns=_nodes_column(results)))
+    return Table(pd.DataFrame(cells), caption, table.drop(columns=_NODES))
 
 
 def calendar_of(results: Results, policy: str, point: int) -> pd.DataFrame:
@@ -257,7 +258,7 @@ def _years_of_replications(results: Results, point: int, table: pd.DataFrame) ->
 
 def _oldest_node(results: Results, point: int, table: pd.DataFrame) -> str:
     """The node with the oldest data on average, and how old they are."""
-    ages = np.mean([*table[_nodes_column(results)]], axis=0)
+    ages = np.mean([*table[_NODES]], axis=0)
     oldest = int(np.argmax(ages))
     (title,) = node_titles(results.scenario(point), [oldest])
     return f"{title}, {metric_of(AGE).within} {metric_of(_age_column(results)).write(ages[oldest])}"
@@ -265,7 +266,3 @@ def _oldest_node(results: Results, point: int, table: pd.DataFrame) -> str:
 
 def _age_column(results: Results) -> str:
     return column_in_sheet_unit(AGE, results.missions)
-
-
-def _nodes_column(results: Results) -> str:
-    return f"{NODE_AGES}_{metric_of(AGE).sheet_unit}"
