@@ -25,7 +25,7 @@ from dess.scenario.quantities import printed
 
 # What is asked beyond the sheet: its meaning, and what an empty answer means.
 _BEYOND = {
-    "base": ('where UAVs start and charge, in degrees, such as "8.70, 53.87", or as x, y', None),
+    "base": ('where UAVs start and charge: longitude, latitude ("8.70, 53.87"), or x, y', None),
     "uavs": ("number of UAVs", "2"),
     "pads": ("number of charging pads", "1"),
     "zone": ('size of the charging zone in cells, such as "3 x 2"; or two cells for each UAV', ""),
