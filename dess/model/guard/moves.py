@@ -91,7 +91,8 @@ def contests(mission, uavs, i, sizes, turns):
     Returns:
         Two bits for each action, as ``contest`` reads them: 0 if the cell is free; 1 if a teammate
         that gives way is on it; 2 if a teammate with the right of way (less battery; on a tie,
-        lower index) may come or stay there; 3 if a parked teammate is on it.
+        lower index) may come or stay there; 3 if a parked teammate is on it, or near small zones
+        one that waits in its cell and has just overruled the UAV.
     """
     u = uavs[i]
     levels = 0
@@ -101,6 +102,8 @@ def contests(mission, uavs, i, sizes, turns):
         if j == i or not o.active or abs(east) + abs(south) > 2:
             continue
         parked = _stands(mission, uavs, j, sizes, turns)
+        if turns is not None and u.overruled and u.overruled_by == j and waits_in_zone(mission, o):
+            parked = parked or is_tight(mission, sizes)  # or it would overrule it again and again
         goes_first = o.battery < u.battery or (o.battery == u.battery and j < i)
         for action in range(5):
             slots = abs(east - STEP_X[action]) + abs(south - STEP_Y[action])
@@ -431,16 +434,18 @@ def _wait(mission, u, chart, action, x, y, home, reach):
     """The battery that a UAV keeps in wind for its wait for a pad if it comes after an action.
 
     In still air, it may as well fly about until its turn comes. In wind, this costs more than the
-    slots that it takes, and so does a detour of two cells around a parked teammate.
+    slots that it takes, and so does a detour of two cells around a parked teammate. One that is
+    in its cell and stays there needs none.
     """
-    if is_calm(reach) or home.cells == 0:
+    if is_calm(reach):
         return 0
     slots = 1 if action == HOVER else u.slots_per_cell
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
     if home.begins <= arrives:
         return 0
     battery = (home.begins - arrives) * waiting_slot(mission)
-    if has_costs(mission):
+    stays = home.cells == 0 and action == HOVER
+    if has_costs(mission) and not stays:
         battery += 2 * max_slot_cost(mission)
     return battery
 

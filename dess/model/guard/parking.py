@@ -232,8 +232,8 @@ def _choose(mission, uavs, i, chart, memory, reach):
             continue
         keeps = _has_cell(mission, o, turns[j], chart, are_matched)
         keeps = keeps or not is_crowded(mission, chart, o.zone)
-        if not are_matched:
-            keeps = keeps or j == i or waits_in_zone(mission, o)
+        keeps = keeps or (j == i and not are_matched)
+        keeps = keeps or (waits_in_zone(mission, o) and not turns[j].leaves)
         taken[chart.nearest[o.y, o.x]] = _TAKEN if keeps else _OCCUPIED
     count = _sort(mission, uavs, turns, memory.order)
     for place in range(count):

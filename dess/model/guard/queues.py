@@ -8,6 +8,8 @@ mission alone, so all teammates have the same one. For every UAV that must charg
   C_S (``asks``), and
 - when it must begin to charge at the latest, or its battery will be empty (``deadline``).
 
+A UAV whose battery does not last to any zone has no turn, so that no teammate makes room for it.
+
 A zone grants its pads in the order in which UAVs ask. Played forward, this tells when each begins
 to charge (``_serve``). Each slot that a UAV lacks is a price, and a small one is each slot that it
 has not to spare. If the usual order has a price, UAVs may give way: who would be without battery
@@ -41,9 +43,9 @@ from dess.scenario.fields import MOST_ZONES
 LACKING, SPARE = 64, 4
 # The slots that a UAV keeps for delays of those who are charged before it.
 KEPT = 2
-# The price of a UAV without a cell in a zone, which waits outside for its turn, and the slots in
-# which a UAV leaves its cell and the next one takes it.
-OUTSIDE, CHANGE = 32, 2
+# The price of a UAV without a cell in a zone, which waits outside for its turn: less than that of a
+# UAV that has no slot to spare. And the slots in which a UAV leaves its cell and the next takes it.
+OUTSIDE, CHANGE = 3, 2
 
 # The orders in which a zone may charge the UAVs that come to it: as they ask; of those that wait,
 # the one with the earliest deadline; by their deadlines, though a pad is idle until one comes.
@@ -185,6 +187,8 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
             turn.spent[u.zone] = 0
         else:
             find_ways(mission, u, turn, chart, reach)
+            if thousandths_left(u) - turn.spent[turn.zone] < waiting_slot(mission):
+                turn.zone = -1
     _choose_zones(mission, uavs, chart, plan)
     for j in range(mission.uavs):
         plan.turns[j].leaves = is_tight(mission, chart.sizes) and _may_leave(uavs[j], j, plan)

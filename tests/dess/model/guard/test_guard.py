@@ -383,3 +383,13 @@ def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one
     state, chart = placed(team, **sea)
     zones = [compiled.parking_cell(state.missions[0], state.uavs[0], i, chart)[0] for i in (0, 1)]
     assert zones == [0, 22]
+
+
+def test_in_wind_a_uav_that_waits_in_its_cell_does_not_fly_its_wait_away():
+    """It begins in 12 slots and can hover for 16; a detour on the way back may take four."""
+    sea = {"grid": 24, "rows": 3, "zone": [0, 0, 2, 3], "nodes": [[12, 0]], "pads": 1}
+    sea |= {"charge_start": 10, "charge_complete": 80, "wind": {"strength": 0.8, "direction": 40}}
+    waiting = {"x": 0, "y": 1, "battery": 16, "executed": HOVER}
+    first = waiting | {"y": 0, "battery": 15}
+    assert np.flatnonzero(_mask(waiting, first, **sea)[0]).tolist() == [HOVER]
+    assert _mask(waiting | {"battery": 30}, first, **sea)[0].sum() > 1

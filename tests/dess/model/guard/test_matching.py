@@ -13,7 +13,7 @@ from dess.model.state import END_NAMES, HOVER
 from tests import compiled
 from tests.dess.envs.episodes import placed
 from tests.dess.model.guard.test_guard import _mask
-from tests.drawn import EAST, NORTH, SOUTH
+from tests.drawn import EAST, NORTH, SOUTH, WEST
 
 # A strip of three rows with a zone of a cell for each UAV at its western end, and one of a single
 # cell at its eastern end. Missions end on the ground, and there are no margins but for teammates.
@@ -107,6 +107,24 @@ def test_in_the_air_a_uav_at_c_s_keeps_its_cell_if_its_zone_has_one_for_all_that
     assert _homes(team, **sea)[:2] == [(23, 2), (23, 0)]
     moves = _mask(*team, **sea)
     assert np.flatnonzero(moves[1]).tolist() == [HOVER] and not moves[0, EAST]
+
+
+def test_in_the_air_a_uav_that_waits_for_its_turn_keeps_its_cell():
+    """It cannot ask above C_S, and would not leave the cell for the one that comes."""
+    waiting = {"x": 0, "y": 1, "battery": 40, "executed": HOVER}
+    team = [waiting, {"x": 1, "y": 1, "battery": 30}, {"x": 12, "y": 2}]
+    assert _homes(team, **STRIP, pads=1)[1] == (0, 2)
+
+
+def test_a_late_uav_flies_around_one_that_waits_and_has_just_overruled_it():
+    """The one that waits cannot leave its cell in time, and would overrule it again."""
+    waiting = {"x": 0, "y": 1, "battery": 40, "executed": HOVER}
+    late = {"x": 1, "y": 1, "battery": 5, "latch": True}
+    overruled = late | {"overruled": True, "overruled_by": 0}
+    for state, around in ((late, False), (overruled, True)):
+        moves = _mask(waiting, state, {"x": 12, "y": 2}, **STRIP, pads=1)[1]
+        assert moves[WEST] != around
+        assert (moves[NORTH] or moves[SOUTH]) == around
 
 
 def test_a_cell_that_parked_uavs_close_off_does_not_count():
