@@ -23,7 +23,8 @@ spent. The first case that applies tells the safe actions:
 | 9. any other | the nearest |
 
 What leaves no action is left out, and a UAV without any hovers. In missions that end on the ground,
-who must charge and is in time does not take cells that teammates count on (3 to 9).
+who must charge and is in time does not take cells that teammates count on (3 to 9), and who makes
+way may hinder others if no move is left in 2b.
 """
 
 from typing import NamedTuple
@@ -340,6 +341,8 @@ def _leaving_moves(mission, uavs, i, chart, turns, moves):
     leaving = elsewhere & moves.empty or elsewhere & moves.clear
     if not leaving and mission.slot % 2 == 1:  # in the other slots, it lets them go first
         leaving = elsewhere & ~_ceded(mission, uavs, i, chart.sizes, turns)
+        if lands(mission):  # there all teammates may come to charge
+            leaving = leaving or elsewhere
     if u.overruled and u.zone >= 0 and is_tight(mission, chart.sizes):
         # A teammate may want the same cell again and again, so it tries one after another, and
         # lets the teammate go first in some slots.

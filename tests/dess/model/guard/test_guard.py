@@ -385,6 +385,20 @@ def test_a_uav_that_can_reach_two_zones_leaves_the_pad_to_one_that_can_reach_one
     assert zones == [0, 22]
 
 
+def test_who_stands_in_the_way_before_a_landing_moves_on_though_all_cells_are_contested():
+    """All teammates may charge there, so there is no move that hinders none who comes to charge."""
+    team: list[dict[str, Any]] = [{"x": 5, "y": 1, "battery": 50, "latch": True}]
+    team += [{"x": 4, "y": y, "battery": 40, "latch": True} for y in (0, 2)]
+    team += [{"x": 6, "y": 1, "battery": 20, "latch": True, "overruled": True, "overruled_by": 0}]
+    sea = {"grid": 24, "rows": 3, "zone": [0, 0, 2, 3], "nodes": [[12, 0]], "landing": True}
+    state, chart = placed(team, **sea)
+    rows = np.zeros(len(team), int), np.arange(len(team))
+    for slot in (6, 7):
+        state.missions["slot"] = slot
+        may_hover = guard(View(state, SimpleNamespace(chart=chart), *rows))[0, HOVER]
+        assert may_hover == (slot == 6)
+
+
 def test_in_wind_a_uav_that_waits_in_its_cell_does_not_fly_its_wait_away():
     """It begins in 12 slots and can hover for 16; a detour on the way back may take four."""
     sea = {"grid": 24, "rows": 3, "zone": [0, 0, 2, 3], "nodes": [[12, 0]], "pads": 1}
