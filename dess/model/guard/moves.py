@@ -437,18 +437,16 @@ def _wait(mission, u, chart, action, x, y, home, reach):
     """The battery that a UAV keeps in wind for its wait for a pad if it comes after an action.
 
     In still air, it may as well fly about until its turn comes. In wind, this costs more than the
-    slots that it takes, and so does a detour of two cells around a parked teammate. One that is
-    in its cell and stays there needs none.
+    slots that it takes, and so does a detour of two cells around a parked teammate.
     """
-    if is_calm(reach):
+    if is_calm(reach) or home.cells == 0:
         return 0
     slots = 1 if action == HOVER else u.slots_per_cell
     arrives = slots + distance(chart, x, y, home.x, home.y) * u.slots_per_cell
     if home.begins <= arrives:
         return 0
     battery = (home.begins - arrives) * waiting_slot(mission)
-    stays = home.cells == 0 and action == HOVER
-    if has_costs(mission) and not stays:
+    if has_costs(mission):
         battery += 2 * max_slot_cost(mission)
     return battery
 

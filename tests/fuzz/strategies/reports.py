@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 
 from dess.analysis.results.chunks import DERIVED
-from dess.reports.pages.kernels import TIMED
+from dess.reports.pages.missing import TIMED
 from dess.reports.pages.notebook import read_report
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step

@@ -397,13 +397,3 @@ def test_who_stands_in_the_way_before_a_landing_moves_on_though_all_cells_are_co
         state.missions["slot"] = slot
         may_hover = guard(View(state, SimpleNamespace(chart=chart), *rows))[0, HOVER]
         assert may_hover == (slot == 6)
-
-
-def test_in_wind_a_uav_that_waits_in_its_cell_does_not_fly_its_wait_away():
-    """It begins in 12 slots and can hover for 16; a detour on the way back may take four."""
-    sea = {"grid": 24, "rows": 3, "zone": [0, 0, 2, 3], "nodes": [[12, 0]], "pads": 1}
-    sea |= {"charge_start": 10, "charge_complete": 80, "wind": {"strength": 0.8, "direction": 40}}
-    waiting = {"x": 0, "y": 1, "battery": 16, "executed": HOVER}
-    first = waiting | {"y": 0, "battery": 15}
-    assert np.flatnonzero(_mask(waiting, first, **sea)[0]).tolist() == [HOVER]
-    assert _mask(waiting | {"battery": 30}, first, **sea)[0].sum() > 1
