@@ -27,7 +27,7 @@ from dess.analysis.stats.differences import Paired, compare, compare_unpaired
 from dess.analysis.stats.rows import group_rows
 from dess.base.errors import shown
 from dess.model.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
-from dess.scenario.fields import dotted
+from dess.scenario.values import dotted
 
 _KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
 _MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]

@@ -42,8 +42,9 @@ from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in
 from dess.base.files.writing import is_read_only, toml_value, write_file
 from dess.policies.registry import list_teams
-from dess.scenario.fields import dotted, fields_of
+from dess.scenario.fields import fields_of
 from dess.scenario.scenario import ScenarioSpace, is_scenario_name, load_scenario
+from dess.scenario.values import dotted
 
 WHAT_IF = "what-if"
 # Missions of every setting of a sweep, and of every side of a what-if question.

@@ -25,8 +25,8 @@ from dess.base.commands import command_line
 from dess.base.errors import unknown_name
 from dess.base.files.writing import toml_value
 from dess.model.record import MISSION_RECORD
-from dess.scenario.fields import dotted
 from dess.scenario.scenario import SEA, ScenarioSpace, is_scenario_name, load_scenario
+from dess.scenario.values import dotted
 
 
 def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:

@@ -23,8 +23,9 @@ from dess.base.errors import shown
 from dess.physics.section import Integer, tuples
 from dess.physics.streams import MAX_REPLICATION, MAX_SEED
 from dess.scenario.families import seas_of
-from dess.scenario.fields import dotted, fields_of
+from dess.scenario.fields import fields_of
 from dess.scenario.scenario import SEA, Scenario
+from dess.scenario.values import dotted
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
 NOISE = "replication (noise)"

@@ -37,7 +37,6 @@ from dess.model.batch import check_slotted
 from dess.physics.section import Integer, plain, tuples
 from dess.physics.streams import MAX_SEED
 from dess.policies.registry import list_teams, load_team
-from dess.scenario.fields import dotted
 from dess.scenario.scenario import (
     SEA,
     ScenarioSpace,
@@ -47,6 +46,7 @@ from dess.scenario.scenario import (
     scenario_at,
     validated,
 )
+from dess.scenario.values import dotted
 
 Engine = Literal["batch", "events"]
 

@@ -54,14 +54,13 @@ from dess.scenario.fields import (
     SECTIONS,
     ZONE_PADS,
     Fields,
-    dotted,
     fields_of,
     is_number,
-    merged,
 )
 from dess.scenario.nodes import AMOUNTS
 from dess.scenario.notes import notes_after, tell
 from dess.scenario.own_sea import OwnSea, Positions, unread
+from dess.scenario.values import dotted, merged
 from dess.scenario.weather import REPLACED, Weather, in_weather
 
 # What a design calls the scenario of its points, if it differs from point to point.

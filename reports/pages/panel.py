@@ -52,8 +52,9 @@ from dess.reports.pages.templates import (
     page_script,
     render_part,
 )
-from dess.scenario.fields import dotted, is_number
+from dess.scenario.fields import is_number
 from dess.scenario.scenario import SEA, ScenarioSpace, is_scenario_name
+from dess.scenario.values import dotted
 
 PAPER = "paper"  # the scenario of the example of the index
 PORTION = 25  # the most missions of a call of the module

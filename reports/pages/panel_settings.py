@@ -11,9 +11,9 @@ from dess.analysis.names import RANGES, ZONE_PADS, field_named, value_text
 from dess.analysis.numbers import format_quantity
 from dess.base.files.writing import toml_value
 from dess.scenario.data_sheet import Units
-from dess.scenario.fields import dotted
 from dess.scenario.quantities import measured, printed, times
 from dess.scenario.scenario import ScenarioSpace
+from dess.scenario.values import dotted
 
 # What a reader may change wherever the scenario lets him, and by which values.
 COUNTS = {"uavs": 8, "pads": 16}  # every number up to this one, or to that of the page
