@@ -29,7 +29,8 @@ from dess.reports.pages.panel import Panel
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile
 from dess.scenario.own_sea import ZonePlace
-from dess.scenario.places import Features, _PlanDocument
+from dess.scenario.readers.geojson import Features
+from dess.scenario.readers.plan import _PlanDocument
 from dess.scenario.scenario import Scenario, ScenarioSpace, validated
 from tests.test_architecture import FLOORS, SOURCES
 

@@ -19,7 +19,7 @@ from dess.analysis.numbers import format_count, join_words, write_csv
 from dess.analysis.results.event_log import Events, battery_from_full
 from dess.base.errors import InputError
 from dess.scenario.own_sea import Positions
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from dess.scenario.scenario import Constants, Scenario
 
 TABLE = "plan.csv"

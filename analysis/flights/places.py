@@ -10,7 +10,7 @@ import numpy as np
 from dess.analysis.flights.route import Place, SeaMap
 from dess.analysis.numbers import format_count
 from dess.base.errors import InputError
-from dess.scenario.places import EARTH_RADIUS
+from dess.scenario.projection import EARTH_RADIUS
 
 
 class ZonePlaces(NamedTuple):

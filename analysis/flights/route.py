@@ -17,7 +17,7 @@ from dess.physics.chart import Cell
 from dess.physics.energy import PERCENT
 from dess.physics.fleet import type_of
 from dess.scenario.own_sea import Positions
-from dess.scenario.places import EARTH_RADIUS, Projection
+from dess.scenario.projection import EARTH_RADIUS, Projection
 from dess.scenario.scenario import Scenario
 
 _EDGE = 1e-4  # of a cell, by which a place may be rounded off it [cells]

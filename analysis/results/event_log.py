@@ -12,7 +12,7 @@ from dess.analysis import numbers
 from dess.base.errors import InputError
 from dess.physics.chart import spread
 from dess.physics.fleet import type_of
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from dess.scenario.scenario import Scenario
 
 _ROUNDING = 1e-9  # less than this is no part of a packet [data units]

@@ -16,7 +16,7 @@ from dess.physics.failures import MOST_PADS
 from dess.physics.fleet import IN_UNITS, move_phases, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.fields import MOST_DATA, Fields
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from dess.scenario.weather import ALWAYS, DAYLIGHT
 
 # Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70

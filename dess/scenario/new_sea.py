@@ -20,7 +20,8 @@ from dess.base.errors import InputError, shown, unknown_name, validated
 from dess.base.files.reading import parse_toml
 from dess.scenario.data_sheet import LINK_BUDGET, LORA, DataSheet
 from dess.scenario.nodes import MAX_GRID, RATES, NodesFile, NodesFound
-from dess.scenario.places import GEOGRAPHIC, LIMITS, Projection
+from dess.scenario.places import GEOGRAPHIC, LIMITS
+from dess.scenario.projection import Projection
 from dess.scenario.quantities import printed
 
 # What is asked beyond the sheet: its meaning, and what an empty answer means.

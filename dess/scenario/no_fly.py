@@ -27,8 +27,10 @@ from dess.physics.section import Number
 from dess.scenario import places
 from dess.scenario.extents import MOST_METRES, lies_elsewhere, radii_of, radius_of, unread_names
 from dess.scenario.notes import tell
-from dess.scenario.places import Place, Projection, Size
+from dess.scenario.places import Place
 from dess.scenario.polygons import border_within, centres_in, lie_in
+from dess.scenario.projection import Projection, Size, is_on_grid
+from dess.scenario.readers import read_places
 
 # The letters of maps, those of the MAPF benchmark among them: trees and water are closed.
 CLOSED, FREE = "#@OTW", ".GS"
@@ -59,7 +61,7 @@ def no_fly_in(
     """(H, W) whether a cell is a no-fly cell of a file; notes tell what closes none or is not read.
 
     Args:
-        path: A file ``.txt``, ``.map``, ``.png``, or one that ``places.read_places`` reads.
+        path: A file ``.txt``, ``.map``, ``.png``, or one that ``readers.read_places`` reads.
         size: Cells of the grid from west to east and from north to south.
         projection: That of the sea, none if the nodes are cells.
         source: What is taken of the file.
@@ -182,7 +184,7 @@ def _tell_unused(path: Path, source: NoFlyFile, kind: str, *used: str) -> None:
 def _of_places(
     path: Path, size: Size, projection: Projection | None, source: NoFlyFile, altitude: float
 ) -> np.ndarray:
-    is_geographic, features = places.read_places(path, _MAPS)
+    is_geographic, features = read_places(path, _MAPS)
     if not features:
         raise InputError(path, "has no places", "one or more")
     if is_geographic and projection is None:
@@ -200,7 +202,7 @@ def _of_places(
     closed = np.zeros(size[::-1], np.bool_)
     for place in chosen:
         x, y = place.shapes[0][1][0][0].astype(int)
-        if not places.is_on_grid((x, y), size):
+        if not is_on_grid((x, y), size):
             what = f"off the grid of {size[0]} x {size[1]} cells, at {[int(x), int(y)]}"
             allowed = f"0 <= x < {size[0]}, 0 <= y < {size[1]}"
             raise InputError(path, f"{place.where} is {what}", allowed)
@@ -362,7 +364,7 @@ def polygons_hold(
     is_held = np.zeros(len(spots), np.bool_)
     if path.suffix.lower() in _MAPS:
         return is_held
-    for place in source.chosen(places.read_places(path).places, path):
+    for place in source.chosen(read_places(path).places, path):
         for kind, rings in place.shapes:
             for turned in projection.shapes(rings) if kind == places.POLYGON else ():
                 is_held |= lie_in(turned, spots)

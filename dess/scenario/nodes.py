@@ -19,8 +19,11 @@ from pydantic import Field
 from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.physics.chart import Cell
 from dess.scenario import places
-from dess.scenario.places import Place, Projection, Size
+from dess.scenario.places import Place
+from dess.scenario.projection import Projection, Size, is_on_grid
 from dess.scenario.quantities import form_of, quantity_of
+from dess.scenario.readers import read_places
+from dess.scenario.readers.table import amount_of
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 # What columns are called that are used without being asked for, whatever the case.
@@ -93,7 +96,7 @@ class NodesFound(NamedTuple):
         Raises:
             InputError: If the file cannot be read or has no nodes.
         """
-        is_geographic, features = places.read_places(path)
+        is_geographic, features = read_places(path)
         points = [
             (place, ring[0])
             for place in source.chosen(features, path)
@@ -209,7 +212,7 @@ class NodesFound(NamedTuple):
         text = row.property("", [column.lower()])
         if text is not None:
             read: Callable[[str, str], float]
-            read = places.amount_of
+            read = amount_of
             if kind.unit:
                 read = partial(quantity_of, unit=kind.unit)
             amount = read(str(text), where)
@@ -234,7 +237,7 @@ class NodesFound(NamedTuple):
         return where
 
     def _check_on_grid(self, own: list[Cell], size: Size, is_cell_fixed: bool) -> None:
-        beyond = [number for number, cell in enumerate(own) if not places.is_on_grid(cell, size)]
+        beyond = [number for number, cell in enumerate(own) if not is_on_grid(cell, size)]
         if beyond:
             names = listed(f"{self._title(number)} at {[*own[number]]}" for number in beyond)
             verb = "is"

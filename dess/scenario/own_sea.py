@@ -18,7 +18,7 @@ from dess.physics.chart import Cell, Rectangle
 from dess.physics.section import Integer, Number, Strict
 from dess.scenario.no_fly import NoFlyFile, no_fly_in, polygons_hold, zones_in
 from dess.scenario.nodes import DATA, RATES, Amounts, NodesFile, NodesFound
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 
 # What stands for a field in a scenario whose files are not read yet.
 _UNREAD = {"nodes": [[0, 0]], "no_fly": [], "zone": [0, 0, 1, 1]}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dess.scenario.places import Size
+from dess.scenario.projection import Size
 
 
 def border_within(rings: list[np.ndarray], size: Size) -> np.ndarray:

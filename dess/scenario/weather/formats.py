@@ -20,8 +20,9 @@ import pyarrow.compute as pc
 from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.base.files.reading import TEXT_LIMIT, read_bytes
 from dess.base.files.tables import LIMIT, parse_columns, parse_table
-from dess.scenario.places import read_by_others, without_delimiter
 from dess.scenario.quantities import exactly, form_of
+from dess.scenario.readers import read_by_others
+from dess.scenario.readers.table import without_delimiter
 
 TIME, WIND, FROM, U10, V10 = "time", "wind", "from", "u10", "v10"
 # What columns are called; letters may be small or large.
@@ -101,7 +102,7 @@ def read_rows(path: Path, units: Mapping[str, str]) -> tuple[Rows, bytes]:
 
     Args:
         path: The file; its ending tells the form. Those that no form here has are read by other
-            packages: entry points of ``dess.scenario.places.GROUP`` that return times and columns.
+            packages: entry points of ``dess.scenario.readers.GROUP`` that return times and columns.
         units: The units of columns that are not SI, by the names that the file has for them.
 
     Raises:

@@ -21,7 +21,7 @@ from dess.base.files.reading import version_of
 from dess.physics.energy import ACTIONS, PERCENT, SPEEDS
 from dess.physics.energy import MOST as MOST_COST
 from dess.scenario.fields import Fields
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from dess.scenario.quantities import measured
 from dess.scenario.rotary_wing import RotaryWing, airspeeds_of
 from dess.scenario.weather import ALWAYS, DAYLIGHT, Weather

@@ -304,11 +304,11 @@ EXCEPTIONS = {
         ("policies/planner/policy.py", "residual[b].sum()"),
     },
     "a sea is refused by it, and no record has it": {
-        ("dess/scenario/places.py", "np.arcsin"),
-        ("dess/scenario/places.py", "np.cos"),
-        ("dess/scenario/places.py", "np.sin"),
+        ("dess/scenario/projection.py", "np.arcsin"),
+        ("dess/scenario/projection.py", "np.cos"),
+        ("dess/scenario/projection.py", "np.sin"),
         (
-            "dess/scenario/places.py",
+            "dess/scenario/projection.py",
             "np.sin((degrees[first] - degrees[second]) / 2) ** 2",
         ),
     },

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from dess.scenario.places import EARTH_RADIUS, Projection
+from dess.scenario.projection import EARTH_RADIUS, Projection
 
 # A cell is a hundredth of a degree of latitude and, at the equator, of longitude; 0, 0 is the
 # centre of the grid.

@@ -24,7 +24,7 @@ from dess.scenario import no_fly
 from dess.scenario.consistency import distance_error
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile, NodesFound
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from tests import compiled
 from tests.dess.scenario.shapes import CELL, EQUATOR, EXACT, box, collection, feature
 

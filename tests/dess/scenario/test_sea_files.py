@@ -15,8 +15,8 @@ from dess.physics.chart import Cell
 from dess.scenario import no_fly
 from dess.scenario.no_fly import NoFlyFile
 from dess.scenario.nodes import NodesFile, NodesFound
-from dess.scenario.places import Projection, Size
 from dess.scenario.polygons import centres_in
+from dess.scenario.projection import Projection, Size
 from tests.dess.scenario.shapes import EQUATOR, box, collection, feature
 from tests.outside import install_package
 

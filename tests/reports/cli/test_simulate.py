@@ -19,7 +19,7 @@ from dess import load_scenario
 from dess.analysis import load_results
 from dess.analysis.figures.missions import sea_figure
 from dess.model.events import EventLog
-from dess.scenario.places import Projection
+from dess.scenario.projection import Projection
 from tests.analysis.small import files_of
 
 # What the JSON of a mission and a record have in common.
