@@ -21,14 +21,14 @@ if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.analysis.stats.distribution import distribution as distribution
     from dess.analysis.stats.groups import summary as summary
     from dess.analysis.stats.learners import compare_learners as compare_learners
+    from dess.analysis.study.files import load_study as load_study
+    from dess.analysis.study.files import study_names as study_names
     from dess.analysis.study.study import Study as Study
-    from dess.analysis.study.study import load_study as load_study
-    from dess.analysis.study.study import study_names as study_names
 
 _HOME = {
     "Study": "study.study",
-    "load_study": "study.study",
-    "study_names": "study.study",
+    "load_study": "study.files",
+    "study_names": "study.files",
     "run_study": "execution.runner",
     "evaluate": "execution.evaluation",
     "Results": "results.tables",

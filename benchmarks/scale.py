@@ -30,7 +30,8 @@ from dess import load_scenario, simulate_batch
 from dess.analysis import numbers
 from dess.analysis.execution import jobs
 from dess.analysis.execution.runner import run_study
-from dess.analysis.study.study import load_study, study_from
+from dess.analysis.study.files import load_study
+from dess.analysis.study.study import study_from
 from dess.policies.registry import load_team
 from dess.scenario.scenario import ScenarioSpace
 

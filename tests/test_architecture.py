@@ -94,7 +94,8 @@ RUN_FILES = {
 }
 # What decides it by what users have named: a study whose policies are typed, and what they confirm.
 DECIDE = {
-    "dess.analysis.study.study": {"'policies' in overrides", "_may_run_files(info.context)"},
+    "dess.analysis.study.files": {"'policies' in overrides"},
+    "dess.analysis.study.study": {"_may_run_files(info.context)"},
     "dess.analysis.results.provenance": {"True", "run_files"},  # for confirmed teams alone
     "dess.reports.pages.verify": {
         f"is_confirmed({name}, sampling.named)" for name in ("name", "policy")

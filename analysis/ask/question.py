@@ -35,8 +35,9 @@ from dess.analysis.results.tables import Results
 from dess.analysis.sheet import scenario_notes
 from dess.analysis.study.cheapest import Cheapest, Required
 from dess.analysis.study.design import MAX_SIZE, GridDesign, TableDesign
+from dess.analysis.study.fields import replications_of
 from dess.analysis.study.prices import Costs
-from dess.analysis.study.study import Study, replications_of, study_from
+from dess.analysis.study.study import Study, study_from
 from dess.base.commands import command_line
 from dess.base.errors import shown, to_input_error, unknown_name
 from dess.base.files.reading import paths_in

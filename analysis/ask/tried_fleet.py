@@ -19,7 +19,7 @@ from dess.analysis.results.tables import Results
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.verdict import Verdict, judge_margins
 from dess.analysis.stats.weights import values_within
-from dess.analysis.study.study import CHECK
+from dess.analysis.study.fields import CHECK
 from dess.model.events import Event
 from dess.model.record import Records
 from dess.policies.registry import load_team

@@ -34,8 +34,9 @@ from dess.analysis.results.shards import Shard
 from dess.analysis.results.store import Failure, Store, source_folders
 from dess.analysis.results.tables import Results, results_of
 from dess.analysis.study.cheapest import Setting
+from dess.analysis.study.files import load_study
 from dess.analysis.study.stopping import Samples
-from dess.analysis.study.study import Study, load_study
+from dess.analysis.study.study import Study
 from dess.base.files.writing import check_folder
 from dess.policies.registry import load_team
 

@@ -16,7 +16,8 @@ from dess import InputError
 from dess.analysis.results import provenance
 from dess.analysis.study.cheapest import Setting
 from dess.analysis.study.design import DesignPoint
-from dess.analysis.study.study import CHECK, Study, StudyData
+from dess.analysis.study.fields import CHECK, StudyData
+from dess.analysis.study.study import Study
 from dess.base.files.documents import Sha256
 from dess.scenario.data_sheet import Units
 from dess.scenario.scenario import SEA, ScenarioSpace, load_scenario

@@ -24,8 +24,9 @@ from pydantic import (
 )
 
 import dess
+from dess.analysis.study.fields import StudyData
 from dess.analysis.study.stopping import Text
-from dess.analysis.study.study import StudyData, change_scenario
+from dess.analysis.study.study import change_scenario
 from dess.base.errors import to_input_error
 from dess.base.files.documents import Document, Sha256
 from dess.base.sources import OURS, code_of, combined

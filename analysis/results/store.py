@@ -47,8 +47,9 @@ from dess.analysis.results.manifest import (
 )
 from dess.analysis.results.replications import Present, absent_parts, gaps_between, joined_ranges
 from dess.analysis.results.rows import rows_of, stack_tables, tables_of, with_worst_nodes
+from dess.analysis.study.fields import CHECK
 from dess.analysis.study.prices import PURCHASE
-from dess.analysis.study.study import CHECK, Study
+from dess.analysis.study.study import Study
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT
 from dess.base.files.writing import (

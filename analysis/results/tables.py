@@ -18,9 +18,9 @@ from dess.analysis.results.manifest import Cell, Manifest
 from dess.analysis.results.provenance import Origin
 from dess.analysis.results.store import Place, Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
+from dess.analysis.study.fields import StudyData
 from dess.analysis.study.prices import Costs
 from dess.analysis.study.selection import Choice, Selection
-from dess.analysis.study.study import StudyData
 from dess.base.commands import command_line
 from dess.base.errors import unknown_name
 from dess.base.files.writing import toml_value

@@ -6,17 +6,13 @@ from contextlib import suppress
 from functools import cached_property, lru_cache
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 from pydantic import (
-    BeforeValidator,
-    Field,
     PrivateAttr,
-    SerializerFunctionWrapHandler,
     ValidationError,
     ValidationInfo,
     field_validator,
-    model_serializer,
     model_validator,
 )
 
@@ -24,31 +20,25 @@ from dess import InputError
 from dess.analysis.bound import check_scenario
 from dess.analysis.measured import metrics_of_scenario, refuse_neutral, told_metrics
 from dess.analysis.metrics import BOUND, COST, GAP, metric_of
-from dess.analysis.study.cheapest import AnySelection, Cheapest
-from dess.analysis.study.design import Design, DesignPoint, Saltelli, Sampled
-from dess.analysis.study.prices import Costs
+from dess.analysis.study.cheapest import Cheapest
+from dess.analysis.study.design import DesignPoint, Saltelli, Sampled
+from dess.analysis.study.fields import MOST_CHARACTERS, YEARS, Engine, StudyData
 from dess.analysis.study.selection import Selection
-from dess.analysis.study.stopping import MOST_MISSIONS, Precision, StrictTable, Text
 from dess.base.commands import command_line
-from dess.base.descriptions import Description
-from dess.base.errors import cut, listed, to_input_error, unknown_name
-from dess.base.files.reading import Shipped
+from dess.base.errors import cut, listed, to_input_error
 from dess.model.batch import check_slotted
-from dess.physics.section import Integer, plain, tuples
-from dess.physics.streams import MAX_SEED
-from dess.policies.registry import list_teams, load_team
+from dess.policies.registry import load_team
 from dess.scenario.scenario import (
     SEA,
     ScenarioSpace,
     changed,
-    is_scenario_name,
     load_scenario,
     scenario_at,
     validated,
 )
-from dess.scenario.values import dotted
 
-Engine = Literal["batch", "events"]
+# The name or the path of a study that a user has typed, and the fields that replace those there.
+Origin = tuple[str, dict[str, Any]]
 
 
 def engine_of(
@@ -76,139 +66,6 @@ def engine_of(
     return asked
 
 
-_STUDIES = Shipped("study", "dess.analysis.study", "shipped")
-
-# Years with weather that are simulated, if nothing else is asked for, and at most.
-YEARS, MOST_YEARS = 10, 1000
-# The longest name of a study, which is part of the names of files.
-MOST_CHARACTERS = 100
-
-# The first replication of the missions that check a selected setting. They are independent of the
-# missions on which the selection was based.
-CHECK = MOST_MISSIONS
-
-
-def _by_field(values: Any) -> Any:
-    if isinstance(values, dict):
-        return dotted(values)
-    return values
-
-
-class StudyData(StrictTable):
-    """The fields of a study and their limits, as study files and results have them.
-
-    No policy and no scenario is loaded, so that the data may come from anybody.
-
-    Raises:
-        pydantic.ValidationError: If a field is not valid.
-    """
-
-    name: str = Field(
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
-        max_length=MOST_CHARACTERS,
-        description="names the folder of results",
-    )
-    description: Text = Field("", description="what the study is about, in a line")
-    scenario: Text = Field("paper", description="a shipped scenario or a TOML file")
-    set: Annotated[dict[str, Any], BeforeValidator(_by_field)] = Field(
-        {}, description="fields of the scenario, the same everywhere"
-    )
-    design: Design | None = Field(
-        None,
-        description=Description(
-            "the design points",
-            form="a table with the kind of the design; without one, the scenario is the only point",
-        ),
-    )
-    policies: Annotated[tuple[Text, ...], BeforeValidator(tuples)] = Field(
-        min_length=1, description=Description("teams", form='"P" or "P,P,..."')
-    )
-    missions: Integer = Field(
-        1000,
-        ge=1,
-        le=MOST_MISSIONS,
-        description="per design point and policy; with a rule, not given",
-    )
-    years: Integer | None = Field(
-        None,
-        ge=1,
-        le=MOST_YEARS,
-        description="years of weather per design point and policy, in place of missions; "
-        f"{YEARS} where a scenario has weather",
-    )
-    precision: Precision | None = Field(
-        None, description="a rule that asks for as many missions as narrow intervals take"
-    )
-    selection: AnySelection | None = Field(
-        None, description="a rule that asks for as many missions as finding the best point takes"
-    )
-    costs: Costs | None = Field(None, description="prices, for questions about costs")
-    seed: Integer = Field(0, ge=0, le=MAX_SEED)
-    engine: Engine = Field(
-        "batch", description="by default batch, or events if a design point needs it"
-    )
-    logged: Integer = Field(
-        0,
-        ge=0,
-        le=MOST_MISSIONS,
-        description="first replications of every cell whose event log is kept",
-    )
-    bounds: bool = Field(
-        False, strict=True, description="whether every mission has an upper bound, for the gap"
-    )
-
-    @model_serializer(mode="wrap")
-    def _without_years(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave the years out where there are none: such studies are stored as before."""
-        values = handler(self)
-        if self.years is None:
-            values.pop("years", None)
-        return values
-
-    @property
-    def replication_name(self) -> str:
-        """What a replication is: a ``mission``, or a ``year`` where scenarios have weather."""
-        return "year" if self.years else "mission"
-
-    @property
-    def rule(self) -> Precision | AnySelection | None:
-        """The rule that decides the number of replications; None if the number is fixed."""
-        return self.precision or self.selection
-
-    @property
-    def first(self) -> int:
-        """The number of replications of every cell, before a rule asks for more."""
-        if self.years:
-            return self.years
-        if self.rule:
-            return self.rule.first
-        return self.missions
-
-    @property
-    def most(self) -> int:
-        """The largest number of replications of a cell that a rule may ask for."""
-        if self.years:
-            return self.years
-        if self.rule:
-            return self.rule.budget
-        return self.missions
-
-    @property
-    def most_missions(self) -> int:
-        """The largest number of missions of a policy that the study may need."""
-        if not self.selection:
-            return self.most * self.size
-        checked = 1
-        if isinstance(self.selection, Cheapest):
-            checked = self.size
-        return self.selection.budget + self.selection.check * checked
-
-    @property
-    def size(self) -> int:
-        """The number of design points, computed without making them."""
-        return self.design.count if self.design else 1
-
-
 class Study(StudyData):
     """A study: every policy at every design point, in a number of replications.
 
@@ -220,7 +77,7 @@ class Study(StudyData):
         pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
     """
 
-    _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
+    _origin: Origin = PrivateAttr(("", {}))
     _run_files: bool = PrivateAttr(False)
     _processes: tuple[str, ...] = PrivateAttr(())
 
@@ -238,6 +95,7 @@ class Study(StudyData):
         """Keep what a user has typed: processes, and whether files of policies may be run."""
         self._run_files = _may_run_files(context)
         self._processes = tuple(context["processes"]) if context else ()
+        self._origin = context["origin"] if context else ("", {})
 
     @field_validator("policies")
     @classmethod
@@ -460,25 +318,13 @@ def _may_run_files(context: dict[str, Any] | None) -> bool:
     return bool(context and context["run_files"])
 
 
-def replications_of(
-    space: ScenarioSpace, missions: int | None, years: int | None, default: int
-) -> dict[str, int]:
-    """The field of a study that tells its replications: missions, or years with weather.
-
-    Raises:
-        InputError: If the other one is given.
-    """
-    if space.weather.is_on:
-        if missions is not None:
-            raise InputError("missions", "are years, with weather", "years")
-        return {"years": YEARS if years is None else years}
-    if years is not None:
-        raise InputError("years", "are of a scenario with weather", "missions")
-    return {"missions": default if missions is None else missions}
-
-
 def study_from(
-    data: Mapping[str, Any], what: str, *, run_files: bool = False, processes: Sequence[str] = ()
+    data: Mapping[str, Any],
+    what: str,
+    *,
+    run_files: bool = False,
+    processes: Sequence[str] = (),
+    origin: Origin = ("", {}),
 ) -> Study:
     """The study with these fields.
 
@@ -487,86 +333,16 @@ def study_from(
         what: What the fields are of, for messages.
         run_files: Whether Python files may be run as policies, since a user has typed them.
         processes: Processes of Python files, which a user has typed.
+        origin: Where the fields are from, for ``command``.
 
     Raises:
         InputError: If they are not valid; ``what`` is named before the reason.
     """
     try:
-        context = {"run_files": run_files, "processes": processes}
+        context = {"run_files": run_files, "processes": processes, "origin": origin}
         return Study.model_validate(data, context=context)
     except ValidationError as error:
         raise to_input_error(error, what, Study) from None
-
-
-def load_study(
-    name_or_path: str | Path, /, *, processes: Sequence[str] = (), **overrides: Any
-) -> Study:
-    """A shipped study by name, or one from a TOML file.
-
-    Args:
-        name_or_path: One of ``study_names()``, or the path of a TOML file. If the file gives no
-            name, the study is named after the file. A scenario file is looked for in its folder.
-        processes: Further processes of every mission, ``FILE.py:FUNCTION`` each.
-        **overrides: Fields of ``Study`` that replace those of the file. If ``missions`` is less
-            than ``logged``, ``logged`` is reduced to it.
-
-    Raises:
-        InputError: If there is no such study, or it is not valid; or if the file, not ``policies``
-            among the overrides, names a policy of a Python file, which is code.
-    """
-    text = str(name_or_path)
-    overrides = {name: plain(value) for name, value in overrides.items()}
-    where, values = _STUDIES.load(name_or_path)
-    values = {"name": text if text in study_names() else Path(text).stem} | values
-    scenario = values.get("scenario")
-    if isinstance(scenario, str) and not is_scenario_name(scenario):
-        values["scenario"] = str(Path(text).parent / scenario)
-    if "policies" in overrides:
-        overrides["policies"] = list_teams(overrides["policies"])
-    values |= _with_fewer_logs(values, overrides)
-    if unknown := sorted(values.keys() - Study.model_fields.keys()):
-        raise unknown_name(f"{where}: {unknown[0]}", "unknown key", unknown[0], Study.model_fields)
-    study = study_from(values, where, run_files="policies" in overrides, processes=processes)
-    study._origin = (text, overrides)
-    return study
-
-
-def _with_fewer_logs(values: dict[str, Any], overrides: dict[str, Any]) -> dict[str, Any]:
-    """The overrides, with ``logged`` reduced if there are fewer missions than that."""
-    logged = values.get("logged")
-    missions = overrides.get("missions")
-    if isinstance(logged, int) and isinstance(missions, int) and 1 <= missions < logged:
-        return {"logged": missions} | overrides
-    return overrides
-
-
-def study_names() -> list[str]:
-    """The names of the shipped studies."""
-    return _STUDIES.names()
-
-
-def study_descriptions() -> dict[str, str]:
-    """The descriptions of the shipped studies by their names; no study is made or checked."""
-    return {name: _STUDIES.load(name)[1].get("description", "") for name in study_names()}
-
-
-def budget_of(study: StudyData) -> str:
-    """In words, how a study differs from the shipped study of the same name; none is loaded."""
-    if study.name not in study_names():
-        return "as asked"
-    shipped = StudyData.model_validate({"name": study.name, **_STUDIES.load(study.name)[1]})
-    policies = {*study.policies}
-    missions = study.missions
-    words = []
-    if policies < {*shipped.policies}:
-        words.append(f"{len(policies)} of {len(shipped.policies)} policies")
-    elif policies != {*shipped.policies}:
-        words.append("other policies")
-    if missions != shipped.missions:
-        words.append(f"{missions:,} instead of {shipped.missions:,} missions")
-    others = StudyData.model_fields.keys() - {"policies", "missions", "description", "engine"}
-    changed = [key for key in sorted(others) if getattr(study, key) != getattr(shipped, key)]
-    return ", ".join([*words, *(f"another {key}" for key in changed)]) or "full"
 
 
 def _values_in_words(values: dict[str, Any]) -> str:

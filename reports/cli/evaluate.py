@@ -65,7 +65,8 @@ def evaluate(
         estimate_means,
     )
     from dess.analysis.metric_ranges import metric_in_space
-    from dess.analysis.study.study import engine_of, replications_of
+    from dess.analysis.study.fields import replications_of
+    from dess.analysis.study.study import engine_of
     from dess.model.record import measures_of
 
     machines = options.Machines(workers, scheduler)
@@ -142,7 +143,8 @@ def _evaluate_as_study(
     from dess.analysis.execution.effort import check_run
     from dess.analysis.execution.evaluation import of_results
     from dess.analysis.execution.runner import run_study
-    from dess.analysis.study.study import MOST_CHARACTERS, study_from
+    from dess.analysis.study.fields import MOST_CHARACTERS
+    from dess.analysis.study.study import study_from
 
     name = re.sub(r"[^A-Za-z0-9._-]+|^[._-]+", "-", out.absolute().name).lstrip("-")
     data |= {"name": name[:MOST_CHARACTERS] or "evaluation", "description": "an evaluation"}

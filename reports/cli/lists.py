@@ -207,7 +207,7 @@ def new_scenario(
 @studies.callback()
 def list_studies(context: typer.Context) -> None:
     """Print the list, unless one is shown."""
-    from dess.analysis.study.study import study_descriptions
+    from dess.analysis.study.files import study_descriptions
 
     if context.invoked_subcommand is None:
         console.print_list(study_descriptions().items())
@@ -227,7 +227,7 @@ def show_study(
     """
     import tomli_w
 
-    from dess.analysis.study.study import load_study
+    from dess.analysis.study.files import load_study
 
     data = load_study(name).model_dump(mode="json", exclude_none=True)
     if as_json:

@@ -83,7 +83,7 @@ def run(
     """
     from dess.analysis.execution.effort import check_run, plan_study
     from dess.analysis.execution.runner import run_shard
-    from dess.analysis.study.study import load_study
+    from dess.analysis.study.files import load_study
 
     changes = {"missions": missions, "years": years, "policies": policy}
     chosen = {key: value for key, value in changes.items() if value is not None}

@@ -10,7 +10,7 @@ from IPython.display import HTML
 from dess.analysis.numbers import format_span
 from dess.analysis.results.resimulate import Evidence, learned_files
 from dess.analysis.results.tables import Results
-from dess.analysis.study.study import budget_of
+from dess.analysis.study.files import budget_of
 from dess.reports.pages.page import STUDY, Learned, hidden_element
 from dess.reports.pages.tables import make_table
 

@@ -34,7 +34,7 @@ from dess.analysis.ask.question import sweep_question, what_if_question
 from dess.analysis.metrics import AGE, column_in_sheet_unit, metric_of
 from dess.analysis.names import declared_fields, field_named
 from dess.analysis.study.cheapest import Cheapest, Setting
-from dess.analysis.study.study import CHECK
+from dess.analysis.study.fields import CHECK
 from dess.model.state import EAST, SOUTH
 from dess.policies.registry import load
 from dess.scenario.scenario import ScenarioSpace

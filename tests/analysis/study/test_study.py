@@ -1,4 +1,4 @@
-"""They are cells in the manifest, so a design must not move them."""
+"""What a study may ask for, and what is refused before a mission is simulated."""
 
 import pickle
 import shlex
@@ -11,7 +11,7 @@ from dess import InputError, load_scenario
 from dess.analysis import load_study, run_study
 from dess.analysis.study.study import Study
 from dess.policies.registry import load_team
-from tests.analysis.small import grid, small_study, write_scenario
+from tests.analysis.small import grid, small_study
 
 
 def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):
@@ -82,24 +82,6 @@ def test_the_sea_may_differ_from_point_to_point(tmp_path):
     ):
         with pytest.raises(InputError, match=line):
             small_study(tmp_path, design={"kind": "grid", "values": {"scenario": [unknown, "bay"]}})
-
-
-def test_overrides_are_validated_too(tmp_path):
-    write_scenario(tmp_path)
-    assert load_study("table4", missions=5).missions == 5
-    with pytest.raises(InputError, match="study table4: missions"):
-        load_study("table4", missions=0)
-    with pytest.raises(InputError, match="study table4: speed: unknown key"):
-        load_study("table4", speed=1)
-
-
-def test_fewer_missions_than_event_logs_keep_a_log_each():
-    logged = load_study("fig4").logged
-    assert logged > 2
-    assert load_study("fig4", missions=2).logged == 2
-    assert load_study("fig4", missions=logged).logged == logged
-    with pytest.raises(InputError, match="logged: 3 is more than the missions"):
-        load_study("fig4", missions=2, logged=3)
 
 
 def test_nodes_of_a_file_stay_where_they_are(tmp_path):

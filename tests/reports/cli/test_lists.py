@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from dess import ScenarioSpace, load_scenario
 from dess.analysis import load_study
 from dess.analysis.names import declared_fields as fields_in
-from dess.analysis.study.study import study_names
+from dess.analysis.study.files import study_names
 from dess.policies.registry import CLASSES, trained_names
 from dess.reports.cli.commands import app
 from dess.scenario.fields import fields_of

@@ -17,7 +17,7 @@ from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import share_interval
 from dess.analysis.stats.kinds import level_after
 from dess.analysis.stats.requirement import Requirement
-from dess.analysis.study.study import CHECK
+from dess.analysis.study.fields import CHECK
 from tests.analysis.answers.fleet.test_costs import DESIGN, PRICES
 from tests.analysis.small import found_of, small_study
 
