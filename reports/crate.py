@@ -44,7 +44,7 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     Raises:
         InputError: If there is no such licence, or a file of the results is damaged.
     """
-    for damaged in results.store.damaged:
+    for damaged in results.store.contents.damaged:
         raise InputError(damaged, "has been changed since it was written", "results without damage")
     files = _collect_files(results, page)
     about = load_template("ro-crate-metadata.json").render(

@@ -91,7 +91,7 @@ class Job(ABC):
         engine: ``batch`` or ``events``, for the records.
         run_files: Whether Python files of the team may be run, since a user has typed it.
         processes: The processes of the user in every mission, who has typed them.
-        kind: The kind of work, as in ``store.TABLES``.
+        kind: The kind of work, as in ``contents.TABLES``.
         work: What is made in place of records, in words.
     """
 

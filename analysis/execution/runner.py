@@ -254,7 +254,7 @@ class _Run:
 
     def _round(self, parts: Sequence[CellPart], logs: Sequence[CellPart] = ()) -> None:
         """Simulate the missing missions of a round with these parts, then make the event logs."""
-        if self.reuse and self.store.missing("missions", parts):
+        if self.reuse and self.store.contents.missing("missions", parts):
             for source in self._sources:
                 self.store.take_over(source, parts)
         self._make((MissionsJob, parts), (LogJob, logs))
@@ -297,7 +297,7 @@ class _Run:
         """The jobs for what is missing of some chunks."""
         study = self.study
         for chunk in wanted:
-            if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
+            if missing := tuple(self.store.contents.missing(kind.kind, chunk.parts)):
                 spaces = tuple(study.scenarios[part.cell.point] for part in missing)
                 kept = chunks.Chunk(chunk.team, missing)
                 typed = (study.run_files, study.processes)

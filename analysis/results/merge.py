@@ -92,7 +92,7 @@ def _missing(stores: Sequence[Store], kind: str, parts: Sequence[CellPart]) -> l
     """What of some parts no folder has."""
     missing = [*parts]
     for store in stores:
-        missing = store.missing(kind, missing)
+        missing = store.contents.missing(kind, missing)
     return missing
 
 

@@ -12,7 +12,6 @@ but for ``derived/``.
 """
 
 import json
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -37,6 +36,7 @@ from dess.analysis.metrics import (
     columns_in_units,
 )
 from dess.analysis.results import chunks, parquet, shards
+from dess.analysis.results.contents import Contents
 from dess.analysis.results.derived import Derived
 from dess.analysis.results.manifest import (
     NO_TEAM,
@@ -45,8 +45,8 @@ from dess.analysis.results.manifest import (
     Manifest,
     Selected,
 )
-from dess.analysis.results.replications import Present, absent_parts, gaps_between, joined_ranges
-from dess.analysis.results.rows import rows_of, stack_tables, tables_of, with_worst_nodes
+from dess.analysis.results.replications import gaps_between, joined_ranges
+from dess.analysis.results.rows import tables_of, with_worst_nodes
 from dess.analysis.study.fields import CHECK
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import Study
@@ -61,9 +61,6 @@ from dess.base.files.writing import (
     make_folder,
     write_file,
 )
-
-# The folders of the tables of each kind of work; a chunk is present when the first one is.
-TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
 
 Place = tuple[int, int]  # a design point and a replication
 
@@ -115,27 +112,17 @@ class Store:
     Attributes:
         folder: The folder.
         manifest: The manifest of the folder.
+        contents: What is in the folder.
         is_read_only: Whether nothing can be written into the folder.
-        damaged: The files whose content is not what their names say.
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder = folder
         self.manifest = manifest
+        self.contents = Contents(folder, manifest)
         self.is_read_only = False
         self._lock = ExitStack()  # what holds it
-        self.damaged: list[Path] = []
         self._no_files: list[Path] = []  # what has the name of a file of missions and is none
-        self._clear()
-
-    def _clear(self) -> None:
-        """Know of no missions, until the folder is scanned."""
-        self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
-        # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
-        self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
-        # The rows of several tables, until there are new ones: every round of a rule needs them.
-        self._stacked: dict[tuple, pd.DataFrame] = {}
-        self._logs: dict[tuple[str, int], Path] = {}  # by the key of a cell and the replication
 
     @classmethod
     def open(cls, manifest: Manifest, out: str | Path, accept_code: bool = False) -> Self:
@@ -168,8 +155,8 @@ class Store:
             store._remove_temporaries()
             store._check_files()
             store._scan()
-            while store.damaged:
-                delete(store.damaged.pop())
+            while store.contents.damaged:
+                delete(store.contents.damaged.pop())
             store._lock = lock.pop_all()
         return store
 
@@ -226,8 +213,7 @@ class Store:
         manifest = _extended_manifest(folder, Manifest.of(study), accept_code)
         store = cls.scan_folder(folder, manifest)
         for other in source_folders(reuse, manifest):
-            for key, present in other._present["missions"].items():
-                store._present["missions"][key] += present
+            store.contents.count_missions_of(other.contents)
         return store
 
     @classmethod
@@ -299,47 +285,8 @@ class Store:
                     check_place(path)
 
     def _scan(self) -> None:
-        """Find out what is present, and which files are damaged."""
-        self._clear()
-        teams = range(len(self.manifest.policies))
-        for kind, team in [*(("missions", team) for team in teams), ("bounds", NO_TEAM)]:
-            files = [parquet.tables_in(*place) for place in self._places(kind, team)]
-            self.damaged += [path for _, damaged in files for path in damaged]
-            for name in sorted(set.intersection(*(set(tables) for tables, _ in files))):
-                self._examine(kind, team, name, [tables[name] for tables, _ in files])
-        for place, _ in (place for team in teams for place in self._places("events", team)):
-            for path in parquet.files_in(place):
-                key, _, number = parquet.content_hash(path).partition("-")
-                if not parquet.is_log(path):
-                    self.damaged.append(path)
-                elif number:
-                    self._enter_log(key, int(number), path)
-
-    def _places(self, kind: str, team: int) -> list[tuple[Path, str]]:
-        """The folders of a team's tables of a kind of work, with their names in ``SCHEMAS``."""
-        if team == NO_TEAM:
-            return [(self.folder / chunks.BOUNDS, chunks.BOUNDS)]
-        of_team = chunks.partition_name(self.manifest.policies[team].policy)
-        return [(self.folder / name / of_team, name) for name in TABLES[kind]]
-
-    def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
-        """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
-        if parquet.are_of(tables, rows := parquet.parts_in(tables[0])):
-            self._enter(kind, rows, tables)
-            return
-        for folder, _ in self._places(kind, team):
-            paths = parquet.files_in(folder)
-            self.damaged += [path for path in paths if parquet.content_hash(path) == name]
-
-    def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
-        self._stacked.clear()
-        for key, start, stop in rows:
-            self._tables[kind, key].append(tables)
-            self._present[kind][key].append(range(start, stop))
-
-    def _enter_log(self, key: str, replication: int, path: Path) -> None:
-        self._logs[key, replication] = path
-        self._present["events"][key].append(range(replication, replication + 1))
+        """Find out what is in the folder."""
+        self.contents = Contents.found_in(self.folder, self.manifest)
 
     @property
     def derived(self) -> Derived:
@@ -352,22 +299,13 @@ class Store:
         folders = [*paths_in(self.folder, "*/policy=*"), self.folder / chunks.BOUNDS]
         return [path for folder in folders for path in parquet.files_in(folder)]
 
-    def missing(self, kind: str, parts: Iterable[CellPart]) -> list[CellPart]:
-        """What of some parts is missing.
-
-        Args:
-            kind: ``missions``, ``bounds`` or ``events``.
-            parts: The parts.
-        """
-        return absent_parts(parts, self._present[kind])
-
     def begun(self, team: int) -> list[CellPart]:
         """The missions that every cell of a team has, up to the first one that it lacks."""
         parts = []
         for cell in self.manifest.cells[team]:
-            whole = range(cell.first, CHECK)
-            gaps = gaps_between(whole, self._present["missions"][cell.key])
-            present = range(cell.first, gaps[0].start)
+            whole = CellPart(cell, range(cell.first, CHECK))
+            gaps = self.contents.missing("missions", [whole])
+            present = range(cell.first, gaps[0].replications.start)
             if present:
                 parts.append(CellPart(cell, present))
         return parts
@@ -387,21 +325,21 @@ class Store:
 
     def _count(self, kind: str, parts: Sequence[CellPart]) -> Count:
         """How many missions some parts have, and how many of them are missing."""
-        return Count(sum(map(len, parts)), sum(map(len, self.missing(kind, parts))))
+        return Count(sum(map(len, parts)), sum(map(len, self.contents.missing(kind, parts))))
 
     def keep(self, kind: str, chunk: chunks.Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk."""
-        places = self._places(kind, chunk.team)
+        places = self.contents.places(kind, chunk.team)
         for (folder, _), table in [*zip(places, tables, strict=True)][::-1]:
             parquet.write(folder, chunk.name, table)
-        self._enter(kind, chunk.rows, tables)
+        self.contents.enter(kind, chunk.rows, tables)
         delete(self._failure(chunk))
 
     def keep_log(self, cell: Cell, replication: int, columns: dict[str, Any]) -> None:
         """Store the event log of a replication of a cell."""
-        ((folder, _),) = self._places("events", cell.team)
+        ((folder, _),) = self.contents.places("events", cell.team)
         path = parquet.write(folder, chunks.log_name(cell, replication), pa.table(columns))
-        self._enter_log(cell.key, replication, path)
+        self.contents.enter_log(cell.key, replication, path)
 
     def take_over(self, other: "Store", parts: Iterable[CellPart]) -> None:
         """Copy missing missions of some parts from another folder, as far as it has them.
@@ -413,10 +351,11 @@ class Store:
             other: The other results folder, of any study.
             parts: Parts of the study of this folder.
         """
-        for team, of_team in groupby(self.missing("missions", parts), lambda part: part.cell.team):
-            if shared := other._held([*of_team]):
+        missing = self.contents.missing("missions", parts)
+        for team, of_team in groupby(missing, lambda part: part.cell.team):
+            if shared := other.contents.missions_of([*of_team]):
                 try:
-                    frames = other._frames(shared)
+                    frames = other.contents.frames(shared)
                 except InputError:
                     return
                 chunk = chunks.Chunk(team, tuple(shared))
@@ -428,10 +367,11 @@ class Store:
         teams = range(len(self.manifest.policies))
         kinds = [(kind, team) for kind in ("missions", "events") for team in teams]
         for kind, team in [*kinds, ("bounds", NO_TEAM)]:
-            places = zip(self._places(kind, team), other._places(kind, team), strict=True)
-            for (here, _), (there, _) in places:
+            places_here = self.contents.places(kind, team)
+            places_there = other.contents.places(kind, team)
+            for (here, _), (there, _) in zip(places_here, places_there, strict=True):
                 for path in parquet.files_in(there):
-                    if path not in other.damaged and not (here / path.name).exists():
+                    if path not in other.contents.damaged and not (here / path.name).exists():
                         write_file(here / path.name, read_bytes(path, LIMIT))
         self._scan()
 
@@ -444,12 +384,13 @@ class Store:
             return
         parts = [part for chunk in large for part in chunk.parts]
         names = {c.name for c in large}
-        rows = [parquet.parts_in(tables[0]) for tables in self._tables_with("missions", parts)]
+        present = self.contents.tables_with("missions", parts)
+        rows = [parquet.parts_in(tables[0]) for tables in present]
         large_files = {chunks.name_of(of_file): of_file for of_file in rows}
         if large_files.keys() == names:
             return
         new = [chunk for chunk in large if chunk.name not in large_files]
-        for chunk, tables in zip(new, tables_of(new, self._frames(parts)), strict=True):
+        for chunk, tables in zip(new, tables_of(new, self.contents.frames(parts)), strict=True):
             self.keep("missions", chunk, tables)
         merged = joined_ranges(parts)
         gone = {
@@ -460,22 +401,11 @@ class Store:
             )
         }
         gone -= names
-        for folder, _ in self._places("missions", large[0].team):
+        for folder, _ in self.contents.places("missions", large[0].team):
             for path in parquet.files_in(folder):
                 if parquet.content_hash(path) in gone:
                     delete(path)
         self._scan()
-
-    def _frames(self, parts: Iterable[CellPart]) -> list[pd.DataFrame]:
-        """The rows of the files with missions of some parts, and those of the files with UAVs."""
-        return [*map(stack_tables, zip(*self._tables_with("missions", parts), strict=True))]
-
-    def _held(self, parts: Sequence[CellPart]) -> list[CellPart]:
-        """What of the missions of some parts is present."""
-        missing: Present = defaultdict(list)
-        for part in self.missing("missions", parts):
-            missing[part.cell.key].append(part.replications)
-        return absent_parts(parts, missing)
 
     def write_failure(self, chunk: chunks.Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
@@ -568,21 +498,10 @@ class Store:
 
     def _rows(self, kind: str, parts: Sequence[CellPart], table: int = 0) -> pd.DataFrame:
         """The rows of some parts, all of which must be present, in the tables of their kind."""
-        for gap in self.missing(kind, parts)[:1]:
+        for gap in self.contents.missing(kind, parts)[:1]:
             whole = next(part for part in parts if part.cell == gap.cell)
             raise self._incomplete(whole, gap.replications)
-        frames = [tables[table] for tables in self._tables_with(kind, parts)]
-        key = kind, table, *map(id, frames)
-        if key not in self._stacked:
-            self._stacked[key] = stack_tables(frames)
-        rows = rows_of(parts, self._stacked[key])
-        return rows.drop(columns="cell")
-
-    def _tables_with(self, kind: str, parts: Iterable[CellPart]) -> list[Sequence[pa.Table]]:
-        """The tables that contain some parts."""
-        keys = dict.fromkeys(part.cell.key for part in parts)
-        tables_of_parts = (tables for key in keys for tables in self._tables[kind, key])
-        return [*{id(tables): tables for tables in tables_of_parts}.values()]
+        return self.contents.rows(kind, parts, table)
 
     def _incomplete(self, part: CellPart, gap: range) -> InputError:
         team = part.cell.team
@@ -595,22 +514,11 @@ class Store:
         if team != NO_TEAM:
             what = f"missions of {self.manifest.policies[team].policy}"
         problem = f"incomplete, {present} {what}{where}"
-        if self.damaged:
-            problem += f" (damaged: {self.damaged[0]})"
+        if self.contents.damaged:
+            problem += f" (damaged: {self.contents.damaged[0]})"
         if failed := self._failures():
             problem += f" ({len(failed)} chunks failed, see {failed[0]})"
         return InputError(self.folder, problem, "run the study again to complete it")
-
-    @property
-    def logged(self) -> list[tuple[Cell, int]]:
-        """The missions whose event logs are present."""
-        cells = {cell.key: cell for cells in self.manifest.cells for cell in cells}
-        return [(cells[key], number) for key, number in self._logs if key in cells]
-
-    def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
-        """The event log of a replication of a cell, if it is present."""
-        path = self._logs.get((cell.key, replication))
-        return parquet.read(path) if path else None
 
 
 def _extended_manifest(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:

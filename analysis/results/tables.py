@@ -195,7 +195,7 @@ class Results:
         logged = self.study.logged
         log = None
         if replication in range(logged):
-            log = self.store.load_log(cell, replication)
+            log = self.store.contents.load_log(cell, replication)
         if log is None:
             raise InputError(
                 self.store.folder,

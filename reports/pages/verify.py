@@ -170,13 +170,13 @@ def verify_results(
 
 
 def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
-    if store.damaged:
-        lines = [f"{path}: has been changed since it was written" for path in store.damaged]
+    if damaged := store.contents.damaged:
+        lines = [f"{path}: has been changed since it was written" for path in damaged]
         return [Check(f"{store.manifest.study.name}, files", len(store.files), lines)]
     results = results_of(store)
     evidence = Evidence.of(results, sampling.missions, sampling.seed)
     checks = [_compare_missions(evidence, _draw_missions(evidence, sampling), sampling.named)]
-    if store.logged:
+    if store.contents.logged:
         checks.append(_check_logs(store, sampling))
     if results.bounds:
         checks.append(_check_bounds(results, sampling))
@@ -214,7 +214,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
     manifest = store.manifest
     lines = []
-    logged = sampling.draw_missions(store.logged)
+    logged = sampling.draw_missions(store.contents.logged)
     what = f"study {manifest.study.name}"
     sampling.refuse_long_checks(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
@@ -224,7 +224,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         processes = manifest.load_processes(sampling.named)
         about = (space, team, manifest.seed, replication)
         log = simulate(*about, events=True, processes=processes).events
-        stored = store.load_log(cell, replication)
+        stored = store.contents.load_log(cell, replication)
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(
             _match_stored_columns(pd.DataFrame(log.columns()), stored)

@@ -59,7 +59,7 @@ def test_what_is_unpacked_is_the_study(name, tmp_path):
     for table in ("missions", "uavs", "checks"):
         assert getattr(there, table).equals(getattr(results, table))
     assert there.manifest == results.manifest
-    assert len(there.store.logged) == len(results.store.logged)
+    assert len(there.store.contents.logged) == len(results.store.contents.logged)
     assert there.bounds.keys() == results.bounds.keys()
     again = Manifest.of(load_study(tmp_path / "unpacked" / "study.toml"))
     made = results.store.manifest
@@ -109,7 +109,7 @@ def test_damaged_results_are_not_exported(tmp_path):
     log.write_bytes(log.read_bytes()[:-1])
     with pytest.raises(InputError, match="has been changed since it was written"):
         exported(tmp_path, load_results(tmp_path / "out"))
-    assert results.store.damaged == []
+    assert results.store.contents.damaged == []
 
 
 def test_a_crate_has_the_results_alone_as_equal_bytes(tmp_path):

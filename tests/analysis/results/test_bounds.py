@@ -144,7 +144,7 @@ def test_prices_that_are_not_as_many_for_every_cut_are_damaged(out, prices):
     cuts = np.arange(3 if len(prices) else 0)
     table = table_of_bounds(chunk, [Bound(1.0, prices, cuts, 4)])
     path = write(out / "bounds", chunk.name, table)
-    assert Store.read(out).damaged == [path]
+    assert Store.read(out).contents.damaged == [path]
 
 
 def test_results_of_before_have_no_bounds(tmp_path):

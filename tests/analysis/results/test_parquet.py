@@ -80,15 +80,16 @@ def test_a_table_that_is_no_record_is_damaged_and_computed_anew(
     kind, forge, sound, tmp_path, capsys
 ):
     folder = forged(sound, tmp_path / "out", kind, forge)
-    store = Store.read(folder)
-    assert store.damaged and all(path.is_relative_to(folder / "") for path in store.damaged)
+    damaged = Store.read(folder).contents.damaged
+    assert damaged and all(path.is_relative_to(folder / "") for path in damaged)
     assert main(["verify", str(folder)]) == 1
     if kind != "events":
         with pytest.raises(InputError, match="damaged: "):
             load_results(folder)
     again = run_study(small_study(tmp_path, logged=1, policies=["greedy"]), folder)
     assert again.missions.equals(load_results(sound).missions)
-    assert again.uavs.equals(load_results(sound).uavs) and not load_results(folder).store.damaged
+    assert again.uavs.equals(load_results(sound).uavs)
+    assert not load_results(folder).store.contents.damaged
 
 
 def test_event_logs_of_before_are_read_and_verified(sound, tmp_path):
