@@ -357,13 +357,3 @@ def _pack(matrix: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     inputs, outputs = (length - size for length, size in zip(shape, matrix.shape, strict=True))
     filled = np.pad(matrix, ((0, inputs), (0, outputs)))
     return filled.reshape(-1, 2, shape[1]).swapaxes(1, 2).astype(np.int16).ravel()
-
-
-def unpack(integers: Integers) -> dict[str, np.ndarray]:
-    """The (inputs, outputs) weights of each layer, as ``LAYERS`` has them."""
-    sizes = [inputs * outputs for inputs, outputs in LAYERS.values()]
-    parts = np.split(integers.weights, np.cumsum(sizes)[:-1])
-    return {
-        name: part.reshape(-1, shape[1], 2).swapaxes(1, 2).reshape(shape)
-        for part, (name, shape) in zip(parts, LAYERS.items(), strict=True)
-    }

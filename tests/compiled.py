@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from dess.analysis.stats.sequences import SEQUENCE, start_sequence
 from dess.base.kernels import kernel
 from dess.model import rules
 from dess.model.channel import empty_scratch
@@ -11,6 +12,7 @@ from dess.model.ways import Ways
 from dess.physics import chart
 from dess.physics.chart import FAR, distance, is_open
 from dess.policies import choices
+from dess.scenario.fields import MOST_ZONES
 
 
 @kernel
@@ -98,7 +100,7 @@ def _parking_cell(mission, uavs, i, data, chart, memory, reach):
 def plan_of_pads(mission, uavs, i, chart, data=1e6):
     """The plan, and what UAV ``i`` must keep for waits, when it charges, and if it gives way."""
     mission, reach = _with_sections(mission, chart)
-    plan = queues.plan_memory(len(uavs))
+    plan = queues.Plan(np.zeros(len(uavs), queues.TURN), np.zeros(MOST_ZONES, queues.QUEUE))
     return plan, _plan_pads(mission, uavs, i, data, chart, plan, reach)
 
 
@@ -144,3 +146,10 @@ def step_cost(mission, uavs, i, chart, action, x, y):
     after = u.x + STEP_X[action], u.y + STEP_Y[action]
     way = ways.path_length(mission, uavs, i, chart, None, after[0], after[1], x, y)
     return way, moves.contest(moves.contests(mission, uavs, i, chart.sizes, None), action)
+
+
+def new_sequence(least, most, error=0.05, failure=0.0):
+    """A confidence sequence without values, see ``start_sequence``."""
+    sequence = np.zeros(1, SEQUENCE)
+    start_sequence(sequence, float(least), float(most), float(failure), error)
+    return sequence

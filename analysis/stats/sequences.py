@@ -61,28 +61,17 @@ SEQUENCE = np.dtype(
 )
 
 
-def new_sequence(
-    least: float, most: float, error: float = 0.05, failure: float = 0.0
-) -> np.ndarray:
-    """A sequence without values.
-
-    Args:
-        least: The smallest value that there can be, or ``-inf``.
-        most: The largest one, or ``inf``.
-        error: The probability that the sequence fails to cover the mean at some time.
-        failure: By how much a rare failure changes a value without bounds; 0 if that is not known.
-
-    Returns:
-        (1,) ``SEQUENCE``, for ``add_values`` and ``sequence_ends``.
-    """
-    sequence = np.zeros(1, SEQUENCE)
-    start_sequence(sequence, least, most, failure, error)
-    return sequence
-
-
 @kernel
 def start_sequence(sequence, least, most, failure, error):
-    """Make a sequence one without values, see ``new_sequence``."""
+    """Make a sequence one without values.
+
+    Args:
+        sequence: (1,) ``SEQUENCE``, for ``add_values`` and ``sequence_ends``.
+        least: The smallest value that there can be, or ``-inf``.
+        most: The largest one, or ``inf``.
+        failure: By how much a rare failure changes a value without bounds; 0 if that is not known.
+        error: The probability that the sequence fails to cover the mean at some time.
+    """
     s = sequence[0]
     s.error = error
     s.least = least

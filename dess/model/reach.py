@@ -110,11 +110,6 @@ def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
     return np.where(zones >= 0, math.inf, out + costs.hover + back)
 
 
-def in_range(space: ScenarioSpace, node: int) -> np.ndarray:
-    """(H, W) whether a node is in range of a UAV in a cell, by its mean SNR."""
-    return _window(_in_range_about(space), space.nodes[node])
-
-
 def _window(about: np.ndarray, node: Cell) -> np.ndarray:
     """(H, W) what a table by the place of a UAV about a node has for the cells of the grid."""
     rows, columns = (np.array(about.shape) + 1) // 2

@@ -7,7 +7,6 @@
 """
 
 import re
-from collections.abc import Iterator
 from decimal import ROUND_DOWN, ROUND_UP, Context
 from fractions import Fraction
 from functools import cache, lru_cache
@@ -210,11 +209,6 @@ def _sizes(unit: str) -> dict[str, Fraction]:
         for below, time in _sizes("s").items():
             sizes[f"{above}/{below}"] = amount / time
     return sizes
-
-
-def spellings(unit: str) -> Iterator[tuple[str, ...]]:
-    """The spellings of each unit of a kind that ``UNITS`` lists."""
-    yield from UNITS[unit]
 
 
 def unit_of(text: str, units: str) -> str:

@@ -28,8 +28,9 @@ from dess.analysis.stats.intervals import (
 )
 from dess.analysis.stats.kinds import Sample, ends_of_means, level_after
 from dess.analysis.stats.learners import compare_crossed
-from dess.analysis.stats.sequences import add_values, new_sequence, sequence_ends
+from dess.analysis.stats.sequences import add_values, sequence_ends
 from dess.analysis.study.cheapest import Cheapest, Setting
+from tests.compiled import new_sequence
 
 Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
 

@@ -9,8 +9,7 @@ import numpy as np
 from dess.base.vectors import MOST
 from dess.model.state import HOVER
 from dess.policies.dense import BLOCK, VALUES, filled_widths
-from dess.policies.integers import ACTIONS, SCALES, SETS, SHIFTED, Integers
-from dess.policies.quantization import unpack
+from dess.policies.integers import ACTIONS, LAYERS, SCALES, SETS, SHIFTED, Integers
 
 
 class Result(NamedTuple):
@@ -25,6 +24,16 @@ class Result(NamedTuple):
     values: np.ndarray
     clipped: dict[str, int]
     activations: int
+
+
+def _unpack(integers: Integers) -> dict[str, np.ndarray]:
+    """The (inputs, outputs) weights of each layer, as ``LAYERS`` has them."""
+    sizes = [inputs * outputs for inputs, outputs in LAYERS.values()]
+    parts = np.split(integers.weights, np.cumsum(sizes)[:-1])
+    return {
+        name: part.reshape(-1, shape[1], 2).swapaxes(1, 2).reshape(shape)
+        for part, (name, shape) in zip(parts, LAYERS.items(), strict=True)
+    }
 
 
 class PlainDense:
@@ -63,7 +72,7 @@ class PlainIntegers:
     """The network of ``Integers``."""
 
     def __init__(self, integers: Integers) -> None:
-        self._weights = {name: w.astype(np.int64) for name, w in unpack(integers).items()}
+        self._weights = {name: w.astype(np.int64) for name, w in _unpack(integers).items()}
         sizes = [self._weights[name].shape[1] for name in SHIFTED]
         self._biases = self._parts(integers.biases, SHIFTED, sizes)
         self._shifts = dict(zip(SHIFTED, integers.shifts.tolist(), strict=True))

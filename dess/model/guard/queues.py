@@ -96,11 +96,6 @@ class Plan(NamedTuple):
     queues: np.ndarray
 
 
-def plan_memory(uavs: int) -> Plan:
-    """Working memory for missions with so many UAVs."""
-    return Plan(np.zeros(uavs, TURN), np.zeros(MOST_ZONES, QUEUE))
-
-
 @inlined
 def forget_plan(mission, plan):
     """Let the plan tell nothing of any UAV."""
@@ -169,7 +164,7 @@ def plan_pads(mission, uavs, i, data, chart, plan, reach):
         i: Index of the UAV that asks.
         data: Residual data of all nodes together [data units].
         chart: ``Chart``.
-        plan: ``plan_memory``; the plan is written into it.
+        plan: ``Plan``; the plan is written into it.
         reach: ``Ways.reach``.
 
     Returns:

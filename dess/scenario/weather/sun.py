@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from dess.base.elementary import atan2, cos, sin, sqrt
+from dess.base.elementary import cos, sin, sqrt
 
 # The solar elevation [degrees] above which it is light: refraction, and half of the sun's disc.
 SUNRISE = -0.833
@@ -16,25 +16,20 @@ _NOON_2000 = np.datetime64("2000-01-01T12:00:00")
 _DAY, _CENTURY = 86_400, 36_525 * 86_400  # [s]
 
 
-def elevation(times: np.ndarray, latitude: float, longitude: float) -> np.ndarray:
-    """(N,) the solar elevations [degrees], without refraction.
+def is_light(times: np.ndarray, latitude: float, longitude: float) -> np.ndarray:
+    """(N,) whether the sun stands above ``SUNRISE``; see ``sine_of_elevation``."""
+    least = sin(math.radians(SUNRISE))
+    return np.asarray(sine_of_elevation(times, latitude, longitude) > least)
+
+
+def sine_of_elevation(times: np.ndarray, latitude: float, longitude: float) -> np.ndarray:
+    """(N,) the sines of the solar elevations, without refraction.
 
     Args:
         times: (N,) times [UTC], as ``datetime64``.
         latitude: The latitude [degrees].
         longitude: The longitude, to the east [degrees].
     """
-    sine = _sine_of_elevation(times, latitude, longitude)
-    return np.degrees(atan2(sine, sqrt(np.maximum(1 - sine * sine, 0))))
-
-
-def is_light(times: np.ndarray, latitude: float, longitude: float) -> np.ndarray:
-    """(N,) whether the sun stands above ``SUNRISE``; the arguments are those of ``elevation``."""
-    least = sin(math.radians(SUNRISE))
-    return np.asarray(_sine_of_elevation(times, latitude, longitude) > least)
-
-
-def _sine_of_elevation(times: np.ndarray, latitude: float, longitude: float) -> np.ndarray:
     since = (times.astype("datetime64[s]") - _NOON_2000).astype(np.int64)
     sine, equation = _declination(since / _CENTURY)
     of_day = (since + _DAY // 2) % _DAY

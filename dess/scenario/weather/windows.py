@@ -45,11 +45,6 @@ def longest_gap(hours: Hours, year: Year) -> int:
     return int((ends - starts).max(initial=0))
 
 
-def open_runs(hours: Hours, year: Year) -> int:
-    """The number of runs of open hours of a year."""
-    return len(_runs(hours.state[year.first : year.first + year.hours] == State.OPEN)[0])
-
-
 def shares_of(hours: Hours, year: Year) -> dict[str, float]:
     """The share of a year's hours that is open, and that each reason closes, by its name."""
     counts = np.bincount(

@@ -9,13 +9,8 @@ import pytest
 from dess.analysis.metrics import PRODUCT
 from dess.analysis.stats.differences import compare_pairs
 from dess.analysis.stats.intervals import bounded_interval, mean_interval, share_interval
-from dess.analysis.stats.sequences import (
-    PARTS,
-    add_values,
-    ends_of_what_was_seen,
-    new_sequence,
-    sequence_ends,
-)
+from dess.analysis.stats.sequences import PARTS, add_values, ends_of_what_was_seen, sequence_ends
+from tests.compiled import new_sequence
 
 PORTION = 25
 

@@ -8,18 +8,14 @@ from hypothesis import HealthCheck, given, settings
 
 from dess import InputError, load_scenario, policies
 from dess.analysis.stats.kinds import LEVEL
-from dess.analysis.stats.sequences import (
-    add_values,
-    ends_of_what_was_seen,
-    new_sequence,
-    sequence_ends,
-)
+from dess.analysis.stats.sequences import add_values, ends_of_what_was_seen, sequence_ends
 from dess.analysis.study.prices import Costs
 from dess.analysis.wasm import entry, image
 from dess.model.batch import simulate_batch
 from dess.model.record import Records
 from dess.scenario.scenario import ScenarioSpace
 from tests import drawn
+from tests.compiled import new_sequence
 from tests.flown import Engine, fly
 
 FAILURES: dict[str, Any] = {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dess import simulate
-from dess.model.reach import Costs, battery_of_trips, in_range, reach_of_nodes
+from dess.model.reach import Costs, battery_of_trips, reach_of_nodes
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script
 
@@ -28,6 +28,10 @@ SEA: dict[str, Any] = {
 
 def _space(sheet: dict[str, str] | None = None, **values: Any) -> ScenarioSpace:
     return ScenarioSpace.of(**(SEA | values), data_sheet=SHEET | (sheet or {}))
+
+
+def _without_range(more: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in (SHEET | more).items() if name != "range"}
 
 
 def _farthest(nodes: tuple[int, ...], space: ScenarioSpace) -> int:
@@ -104,19 +108,24 @@ def test_each_direction_has_its_cost_and_coasts_are_flown_around():
 
 
 def test_a_node_is_in_range_where_its_mean_snr_reaches_the_lowest_step():
-    """With 12 dB at 2 km and an exponent of 2.27, -7.5 dB are reached up to 14.45 km."""
-    rates = {"range": None, "rates": [["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]}
-    sheet = {name: value for name, value in (SHEET | rates).items() if value is not None}
-    space = ScenarioSpace.of(grid=64, nodes=[[0, 0]], data_sheet=sheet)
-    reached = in_range(space, 0)[0]
+    """With 12 dB at 2 km and an exponent of 2.27, -7.5 dB are reached up to 14.45 km.
+
+    In a mission of four slots, a UAV flies one cell, hovers there, and flies back.
+    """
+    steps = [["-7.5 dB", "5.5 kbit/s"], ["0 dB", "50 kbit/s"]]
+    sheet = _without_range({"rates": steps, "horizon": "84 s"})
+    nodes = [[x, 0] for x in range(1, 64)]
+    space = ScenarioSpace.of(grid=64, zone=[0, 0, 1, 1], uavs=1, nodes=nodes, data_sheet=sheet)
     limit = 2000 * 10 ** (19.5 / 22.7)
-    assert [*reached[:50]] == [math.hypot(315 * x, 10) <= limit for x in range(50)]
-    assert 0 < np.count_nonzero(reached) < 64
+    beyond = [x for x, _ in nodes if math.hypot(315 * (x - 1), 10) > limit]
+    reach = reach_of_nodes(space)
+    assert 0 < len(beyond) < len(nodes) and reach.has_limit
+    assert [space.nodes[k][0] for k in reach.lost] == beyond
 
 
 def test_without_range_and_steps_every_node_is_in_range():
-    sheet = {name: value for name, value in SHEET.items() if name != "range"}
+    sheet = _without_range({})
     space = ScenarioSpace.of(grid=64, nodes=[[0, 0], [63, 63]], data_sheet=sheet)
     reach = reach_of_nodes(space)
-    assert in_range(space, 1).all() and not reach.has_limit
+    assert not reach.has_limit
     assert (reach.lost, reach.margins, reach.largest_ratio) == ((), (), 1)

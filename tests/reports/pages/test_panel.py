@@ -19,12 +19,7 @@ from dess import InputError, load_scenario, policies, simulate_batch
 from dess.analysis.metrics import HOME, METRICS, PRODUCT, metric_of
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.requirement import Requirement
-from dess.analysis.stats.sequences import (
-    add_values,
-    ends_of_what_was_seen,
-    new_sequence,
-    sequence_ends,
-)
+from dess.analysis.stats.sequences import add_values, ends_of_what_was_seen, sequence_ends
 from dess.analysis.stats.verdict import (
     ABOVE,
     INCONCLUSIVE,
@@ -50,6 +45,7 @@ from dess.reports.pages.verify import verify_page
 from dess.reports.player import player_script
 from dess.scenario.scenario import ScenarioSpace
 from tests.analysis.small import SCENARIO, SHEET
+from tests.compiled import new_sequence
 from tests.flown import Engine
 
 PAPER = load_scenario("paper")

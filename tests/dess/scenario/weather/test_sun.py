@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dess.scenario.weather.sun import elevation, is_light
+from dess.scenario.weather.sun import is_light, sine_of_elevation
 
 DAY_LENGTHS = {
     ("2020-06-21", 0.0): 12.12,
@@ -14,6 +14,11 @@ DAY_LENGTHS = {
     ("2020-12-21", 70.0): 0.0,
     ("2020-06-21", -53.5): 7.47,
 }
+
+
+def elevation(times, latitude: float, longitude: float) -> np.ndarray:
+    """(N,) the solar elevations [degrees]."""
+    return np.degrees(np.arcsin(sine_of_elevation(times, latitude, longitude)))
 
 
 def minutes_of(day: str) -> np.ndarray:
