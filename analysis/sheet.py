@@ -82,7 +82,7 @@ def battery_sentence(space: ScenarioSpace) -> str:
 
 
 def _in_still_air(space: ScenarioSpace) -> str:
-    """That what is told does not hold for the wind of hourly weather; empty without it."""
+    """Says that a sentence does not hold for the wind of hourly weather; empty without weather."""
     return ", in still air" if space.weather.is_on else ""
 
 

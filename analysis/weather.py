@@ -9,7 +9,7 @@ import pandas as pd
 from dess.analysis import numbers
 from dess.base.errors import listed
 from dess.scenario.scenario import ScenarioSpace
-from dess.scenario.weather.hours import State, Year, hours_of, years
+from dess.scenario.weather.hours import HourState, Year, hours_of, years
 from dess.scenario.weather.windows import longest_gap, shares_of, windows_of
 
 OPEN, NIGHT = "open", "night"
@@ -120,7 +120,7 @@ def hours_by_month(space: ScenarioSpace, chosen: Iterable[Year]) -> pd.DataFrame
         InputError: As ``hours_of``.
     """
     hours = hours_of(space)
-    names = {int(State.OPEN): OPEN} | hours.names
+    names = {int(HourState.OPEN): OPEN} | hours.names
     counts = np.zeros((12, max(names) + 1))
     for year in chosen:
         begin = np.datetime64(f"{year.year}-01-01T00", "h")

@@ -37,7 +37,6 @@ from dess.analysis.facts import Fact
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.results.tables import Results
 from dess.analysis.sheet import scenario_notes
-from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import Table
 from dess.base.errors import unknown_name
 
@@ -331,7 +330,7 @@ def settings_answer(
         question: The question, if it is one.
         metric: The metric that ranks the settings, or is shown beside the required ones.
     """
-    if isinstance(results.study.selection, Cheapest):
+    if results.study.is_search:
         return FleetAnswer(results, question, metric)
     return SweepAnswer(results, question, metric)
 

@@ -43,7 +43,7 @@ from dess.analysis.tables import INTERVALS, Table
 from dess.policies.registry import is_path
 from dess.scenario.scenario import ScenarioSpace, load_scenario
 from dess.scenario.weather import ALWAYS
-from dess.scenario.weather.hours import State, hours_of
+from dess.scenario.weather.hours import HourState, hours_of
 
 FLEET = "the fleet"  # as it is, in tables and figures of its changes
 _ADDED = {"uavs": "one more UAV", "data_sheet.spares": "one more spare UAV"}
@@ -83,7 +83,7 @@ def question_around(results: Results, scenario: str, missions: int = FIRST) -> Q
             changed = load_scenario(scenario, **fixed | values | change)
         except InputError:  # such as more pads than the zone has cells
             continue
-        if not changed.weather.is_on or (hours_of(changed).state == State.OPEN).any():
+        if not changed.weather.is_on or (hours_of(changed).state == HourState.OPEN).any():
             changes.append(change)
     varied = {*values, *(field for change in changes for field in change)}
     start = {field: value for field, value in (fixed | values).items() if field in varied}

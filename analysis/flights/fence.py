@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dess.analysis.flights.route import Place, Route, SeaMap
+from dess.analysis.flights.route import GeoPoint, Route, SeaMap
 from dess.analysis.numbers import format_count
 from dess.base.libraries import needs
 from dess.physics.chart import NO_FLY
@@ -30,8 +30,8 @@ class Fence:
             [m]; None if it has all of them.
     """
 
-    inside: list[Place]
-    outside: list[list[Place]]
+    inside: list[GeoPoint]
+    outside: list[list[GeoPoint]]
     all_corners: int
     left_out: float | None = None
 
@@ -260,7 +260,7 @@ def _trace_outline(piece: list[tuple[int, int, int]]) -> Corners:
     return kept
 
 
-def _make_polygon(corners: list[Place], *, inclusion: bool) -> dict[str, Any]:
+def _make_polygon(corners: list[GeoPoint], *, inclusion: bool) -> dict[str, Any]:
     return {
         "inclusion": inclusion,
         "polygon": [[corner.lat, corner.lon] for corner in corners],

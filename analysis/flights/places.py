@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.analysis.flights.route import Place, SeaMap
+from dess.analysis.flights.route import GeoPoint, SeaMap
 from dess.analysis.numbers import format_count
 from dess.base.errors import InputError
 from dess.scenario.projection import EARTH_RADIUS
@@ -21,8 +21,8 @@ class ZonePlaces(NamedTuple):
         standing: Where each UAV of the fleet stands while it is not charged.
     """
 
-    pads: tuple[Place, ...]
-    standing: tuple[Place, ...]
+    pads: tuple[GeoPoint, ...]
+    standing: tuple[GeoPoint, ...]
 
     @classmethod
     def lay_out(cls, sea: SeaMap, zone: int, spacing: float) -> "ZonePlaces":
@@ -55,14 +55,14 @@ class ZonePlaces(NamedTuple):
         standing = places[pads:] or places[: scenario.uavs]
         return cls(tuple(places[:pads]), tuple(standing))
 
-    def name_of(self, place: Place) -> str:
+    def name_of(self, place: GeoPoint) -> str:
         """What a place is called: pads by their numbers, other places by their UAVs', from 1."""
         if place in self.pads:
             return f"pad {self.pads.index(place) + 1}"
         return f"place {self.standing.index(place) + 1}"
 
 
-def _lay_squares(sea: SeaMap, zone: int, spacing: float, count: int) -> list[Place]:
+def _lay_squares(sea: SeaMap, zone: int, spacing: float, count: int) -> list[GeoPoint]:
     """Up to so many places in squares, the nearest to the zone's place first."""
     x, y, width, height = sea.scenario.rectangles[zone]
     [middle] = sea.spots([sea.place_of_zone(zone)])
@@ -77,4 +77,4 @@ def _lay_squares(sea: SeaMap, zone: int, spacing: float, count: int) -> list[Pla
     spots = sea.projection.cells(degrees.copy())
     is_inside = ((spots >= [x, y]) & (spots <= [x + width, y + height])).all(axis=1)
     is_inside |= (steps == 0).all(axis=1)
-    return [Place.of(*degree) for degree in degrees[is_inside][:count].tolist()]
+    return [GeoPoint.of(*degree) for degree in degrees[is_inside][:count].tolist()]

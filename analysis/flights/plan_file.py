@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dess.analysis.flights.fence import Fence
-from dess.analysis.flights.route import Place, Route, WayPoint
+from dess.analysis.flights.route import GeoPoint, Route, WayPoint
 
 # Commands of MAVLink (MAV_CMD), and what the altitudes of items are relative to (MAV_FRAME).
 WAY_POINT, LOITER, LAND, TAKE_OFF, CHANGE_SPEED = 16, 19, 21, 22, 178
@@ -19,12 +19,12 @@ _RELATIVE = 1  # the altitude mode of QGroundControl
 _GROUND_SPEED, _SAME_THROTTLE = 1, -1
 
 
-def plan_text(route: Route, fence: Fence, rally: Sequence[Place]) -> str:
+def plan_text(route: Route, fence: Fence, rally: Sequence[GeoPoint]) -> str:
     """The file of a flight; its rally points are the UAV's own places in the zones."""
     return json.dumps(_make_document(route, fence, rally), indent=4) + "\n"
 
 
-def _make_document(route: Route, fence: Fence, rally: Sequence[Place]) -> dict[str, Any]:
+def _make_document(route: Route, fence: Fence, rally: Sequence[GeoPoint]) -> dict[str, Any]:
     home = route.points[0].place
     craft = route.craft
     return {

@@ -24,7 +24,7 @@ _EDGE = 1e-4  # of a cell, by which a place may be rounded off it [cells]
 _DECIMALS = 7  # of degrees, as MAVLink has them: about 1 cm
 
 
-class Place(NamedTuple):
+class GeoPoint(NamedTuple):
     """A place on the Earth.
 
     Attributes:
@@ -36,12 +36,12 @@ class Place(NamedTuple):
     lat: float
 
     @classmethod
-    def of(cls, lon: float, lat: float) -> "Place":
+    def of(cls, lon: float, lat: float) -> "GeoPoint":
         """A place, rounded as autopilots have it; longitudes may go on beyond 180 degrees."""
         wrapped = (lon + 180) % 360 - 180
         return cls(round(wrapped, _DECIMALS), round(lat, _DECIMALS))
 
-    def distance_to(self, other: "Place") -> float:
+    def distance_to(self, other: "GeoPoint") -> float:
         """The length of the shortest way to another place [m], on a sphere."""
         north = math.radians(other.lat - self.lat)
         east = math.radians(other.lon - self.lon)
@@ -59,7 +59,7 @@ class WayPoint(NamedTuple):
         shift: How far it is from the middle of its cell [m].
     """
 
-    place: Place
+    place: GeoPoint
     seconds: float
     shift: float
 
@@ -74,7 +74,7 @@ class Moment(NamedTuple):
     """
 
     seconds: float
-    place: Place
+    place: GeoPoint
     altitude: float
 
 
@@ -183,7 +183,7 @@ class Route:
     def metres(self) -> float:
         """How long its way is, without climb and descent."""
         places = [point.place for point in self.points]
-        return math.fsum(map(Place.distance_to, places, places[1:]))
+        return math.fsum(map(GeoPoint.distance_to, places, places[1:]))
 
     @property
     def shift(self) -> float:
@@ -221,23 +221,23 @@ class SeaMap:
         self._positions = positions
         self.projection = Projection(scenario.centre, scenario.size, scenario.cell_size)
 
-    def place_at(self, x: float, y: float) -> Place:
+    def place_at(self, x: float, y: float) -> GeoPoint:
         """A place on the grid [cells]."""
         [(lon, lat)] = self.projection.degrees(np.array([[x, y]], float))
-        return Place.of(float(lon), float(lat))
+        return GeoPoint.of(float(lon), float(lat))
 
-    def middle_of(self, cell: Cell) -> Place:
+    def middle_of(self, cell: Cell) -> GeoPoint:
         """The middle of a cell."""
         return self.place_at(cell[0] + 0.5, cell[1] + 0.5)
 
-    def spots(self, places: Sequence[Place]) -> np.ndarray:
+    def spots(self, places: Sequence[GeoPoint]) -> np.ndarray:
         """(N, 2) places on the grid [cells]."""
         return self.projection.cells(np.array(places, float).reshape(-1, 2))
 
-    def place_of_zone(self, number: int) -> Place:
+    def place_of_zone(self, number: int) -> GeoPoint:
         """The place of a zone: where it was typed, or else the middle of its cells."""
         if number in self._positions.zones:
-            return Place.of(*self._positions.zones[number])
+            return GeoPoint.of(*self._positions.zones[number])
         x, y, width, height = self.scenario.rectangles[number]
         return self.place_at(x + width / 2, y + height / 2)
 
@@ -259,7 +259,7 @@ class SeaMap:
         latitudes = np.radians((degrees[:, 1] + others_in_degrees[:, 1]) / 2)
         return step * np.stack([np.cos(latitudes), np.ones_like(latitudes)], axis=1)
 
-    def begin_way(self, flight: Phase, place: Place) -> tuple[WayPoint, ...]:
+    def begin_way(self, flight: Phase, place: GeoPoint) -> tuple[WayPoint, ...]:
         """The way of a flight from the place of its take-off to before the zone of its landing."""
         cells = [visit.cell for visit in flight.visits]
         first, last = self._ends_in_the_open(cells)
@@ -268,7 +268,7 @@ class SeaMap:
             *map(self._way_point, _turns_and_stops(flight.visits[first : last + 1])),
         )
 
-    def end_way(self, flight: Phase, place: Place, hold: float) -> tuple[WayPoint, ...]:
+    def end_way(self, flight: Phase, place: GeoPoint, hold: float) -> tuple[WayPoint, ...]:
         """The rest of a flight: it waits before the zone for a time [s], and lands at a place."""
         cells = [visit.cell for visit in flight.visits]
         _, last = self._ends_in_the_open(cells)
@@ -288,7 +288,7 @@ class SeaMap:
         zone = self.zone_of(cells[0])
         return next(n for n, cell in enumerate(cells) if self.zone_of(cell) != zone) - 1
 
-    def _leave_zone(self, place: Place, cell: Cell, border: Cell) -> list[WayPoint]:
+    def _leave_zone(self, place: GeoPoint, cell: Cell, border: Cell) -> list[WayPoint]:
         """The take-off from a place, and the way to the middle of a cell at the zone's border."""
         points = [WayPoint(place, 0.0, place.distance_to(self.middle_of(cell)))]
         [spot] = self.spots([place])
@@ -301,7 +301,7 @@ class SeaMap:
         cell_middle = self.middle_of(visit.cell)
         place = cell_middle
         if visit.slots and visit.cell in self._positions.nodes:
-            place = Place.of(*self._positions.nodes[visit.cell])
+            place = GeoPoint.of(*self._positions.nodes[visit.cell])
         seconds = round(visit.slots * self._units.slot, 3)
         return WayPoint(place, seconds, place.distance_to(cell_middle))
 

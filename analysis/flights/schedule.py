@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from dess.analysis.flights.phases import CHARGING, FLIGHT, STANDING, Phase
 from dess.analysis.flights.places import ZonePlaces
-from dess.analysis.flights.route import Craft, Moment, Place, Route, SeaMap, WayPoint
+from dess.analysis.flights.route import Craft, GeoPoint, Moment, Route, SeaMap, WayPoint
 from dess.analysis.flights.separation import Separation, Track, keeps_apart
 
 _WAITS = [2.0 * step for step in range(300)]  # until the way is free, the shortest first [s]
@@ -39,7 +39,7 @@ class Entry(NamedTuple):
     end: float
     battery: tuple[float, float]
     zone: int
-    place: Place
+    place: GeoPoint
     route: Route | None = None
 
 
@@ -62,7 +62,7 @@ class _Uav:
     number: int
     craft: Craft
     zone: int
-    place: Place
+    place: GeoPoint
     battery: float
     track: Track
     entries: list[Entry]
@@ -222,13 +222,13 @@ class Schedule:
         uav.flight = route
         uav.time = route.moments[-2].seconds
 
-    def _land(self, uav: _Uav, zone: int, place: Place) -> None:
+    def _land(self, uav: _Uav, zone: int, place: GeoPoint) -> None:
         """Land at a place, whether its way is free or not: what is too near is refused later."""
         assert uav.flight
         landed = self._find_landing(uav, place, 0.0) or self._with_landing(uav.flight, place, 0.0)
         self._finish(uav, landed, zone)
 
-    def _find_landing(self, uav: _Uav, place: Place, earliest: float) -> Route | None:
+    def _find_landing(self, uav: _Uav, place: GeoPoint, earliest: float) -> Route | None:
         """The flight with a landing at a place that is free at a time [s]; None if it is not.
 
         It waits in the air for others who are in its way, and not for the place.
@@ -240,12 +240,12 @@ class Schedule:
         landings = (self._with_landing(flight, place, wait) for wait in _WAITS)
         return self._first_free(landings, uav)
 
-    def _with_landing(self, flight: Route, place: Place, hold: float) -> Route:
+    def _with_landing(self, flight: Route, place: GeoPoint, hold: float) -> Route:
         assert flight.phase
         end = self._sea.end_way(flight.phase, place, hold)
         return replace(flight, points=flight.points + end, held=hold)
 
-    def _move(self, uav: _Uav, place: Place, earliest: float) -> None:
+    def _move(self, uav: _Uav, place: GeoPoint, earliest: float) -> None:
         """Fly from one place of a zone to another, from a time [s] on."""
         start = max(uav.time, earliest)
         points = (WayPoint(uav.place, 0.0, 0.0), WayPoint(place, 0.0, 0.0))

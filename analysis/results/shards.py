@@ -17,7 +17,7 @@ from dess.base.errors import shown
 from dess.base.files.reading import paths_in, read_text
 from dess.base.files.writing import delete, locked, remove_if_empty, write_file
 
-MOST = 9999
+MOST_SHARDS = 9999
 # How long a shard waits while others begin in the same folder [s].
 PATIENCE = 30.0
 _TYPED = re.compile(r"([1-9]\d{0,3})/([1-9]\d{0,3})")
@@ -46,7 +46,7 @@ class Shard(NamedTuple):
         match = _TYPED.fullmatch(text)
         if match and int(match[1]) <= int(match[2]):
             return cls(int(match[1]), int(match[2]))
-        allowed = f"I/N, such as 2/4, where N is at most {MOST:,}"
+        allowed = f"I/N, such as 2/4, where N is at most {MOST_SHARDS:,}"
         raise InputError("--shard", f"{shown(text)} is no shard", allowed)
 
     def __str__(self) -> str:

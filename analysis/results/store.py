@@ -62,8 +62,6 @@ from dess.base.files.writing import (
     write_file,
 )
 
-Place = tuple[int, int]  # a design point and a replication
-
 
 class Count(NamedTuple):
     """How much of something a folder must have, and how much of it it lacks."""
@@ -254,11 +252,11 @@ class Store:
             delete(path)
 
     def _check_files(self) -> None:
-        """Note what is no file and has the name of one; refuse it where a file has to be.
+        """Note what has the name of a file and is a folder, say; refuse it in the way of a run.
 
-        That is in the place of an event log, and beside the other file of the same missions. A run
-        would find out only when its missions are done. What has only the name of a file of other
-        missions is left alone.
+        It is in the way in the place of an event log, or beside the other file of the same
+        missions: a run would fail only when its missions are done. What has the name of a file of
+        other missions is left alone.
         """
         keys = {cell.key for cells in self.manifest.cells for cell in cells}
         patterns = ("*/policy=*/*.parquet", f"{chunks.BOUNDS}/*.parquet")
@@ -467,7 +465,7 @@ class Store:
         """
         return self._rows("missions", parts, 1)
 
-    def bounds_of(self, parts: Sequence[CellPart]) -> dict[Place, Bound]:
+    def bounds_of(self, parts: Sequence[CellPart]) -> dict[tuple[int, int], Bound]:
         """The bounds of some parts, by design point and replication.
 
         Raises:

@@ -16,7 +16,7 @@ from dess.analysis.metrics import BOUND, GAP, PRODUCT, metric_group
 from dess.analysis.names import SWEEP, SWEEPS
 from dess.analysis.results.manifest import Cell, Manifest
 from dess.analysis.results.provenance import Origin
-from dess.analysis.results.store import Place, Store
+from dess.analysis.results.store import Store
 from dess.analysis.study.cheapest import Cheapest, CheapestChoice
 from dess.analysis.study.fields import StudyData
 from dess.analysis.study.prices import Costs
@@ -133,7 +133,7 @@ class Results:
     missions: pd.DataFrame
     uavs: pd.DataFrame
     checks: pd.DataFrame
-    bounds: dict[Place, Bound]
+    bounds: dict[tuple[int, int], Bound]
     answers: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -356,7 +356,7 @@ def load_begun(out: str | Path) -> Results:
     return Results(store, table, _of_policies(uavs), table[:0], {})
 
 
-def _with_gaps(missions: pd.DataFrame, bounds: Mapping[Place, Bound]) -> pd.DataFrame:
+def _with_gaps(missions: pd.DataFrame, bounds: Mapping[tuple[int, int], Bound]) -> pd.DataFrame:
     """The missions with their bounds, and how far each is below its bound."""
     places = zip(missions["point"], missions["replication"], strict=True)
     bound = np.array([bounds[place].ratio for place in places])

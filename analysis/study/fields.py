@@ -115,6 +115,11 @@ class StudyData(StrictTable):
         return self.precision or self.selection
 
     @property
+    def is_search(self) -> bool:
+        """Whether the study searches for the cheapest setting."""
+        return isinstance(self.selection, Cheapest)
+
+    @property
     def first(self) -> int:
         """The number of replications of every cell, before a rule asks for more."""
         if self.years:
@@ -138,7 +143,7 @@ class StudyData(StrictTable):
         if not self.selection:
             return self.most * self.size
         checked = 1
-        if isinstance(self.selection, Cheapest):
+        if self.is_search:
             checked = self.size
         return self.selection.budget + self.selection.check * checked
 

@@ -129,7 +129,7 @@ class Study(StudyData):
 
     @property
     def metrics(self) -> list[str]:
-        """The metrics that missions of the study have, be it only at some design points."""
+        """The metrics that missions have at one design point or more."""
         measured = {name for space in self.scenarios for name in metrics_of_scenario(space)}
         if all(space.units for space in self.scenarios):
             measured |= {metric_of(name).in_units.column for name in measured}
@@ -180,7 +180,7 @@ class Study(StudyData):
             else:
                 rule = "selection"
             raise InputError("missions", f"are decided by {rule}", "either")
-        if isinstance(self.selection, Cheapest) and not self.costs:
+        if self.is_search and not self.costs:
             raise InputError(
                 "costs", "are missing", "a table of prices, for the selection of the cheapest"
             )

@@ -34,8 +34,7 @@ from dess.scenario.fields import SAMPLED
 from dess.scenario.quantities import measured
 from dess.scenario.scenario import ScenarioSpace
 from dess.scenario.weather import Weather
-from dess.scenario.weather.hours import State as HourState
-from dess.scenario.weather.hours import Year, hours_of, years
+from dess.scenario.weather.hours import HourState, Year, hours_of, years
 from dess.scenario.weather.windows import windows_of
 
 HOUR = 3_600_000  # [ms]

@@ -35,7 +35,7 @@ from dess.physics.energy import ACTIONS, HOVERING, PERCENT, waiting_slot
 from dess.scenario.scenario import ScenarioSpace
 
 
-class Costs(NamedTuple):
+class SlotCosts(NamedTuple):
     """What a UAV takes of its battery in the air [% / 1000].
 
     Attributes:
@@ -90,16 +90,16 @@ def reach_of_nodes(space: ScenarioSpace) -> Reach:
     )
 
 
-def costs_of(space: ScenarioSpace, uav: int) -> Costs:
+def costs_of(space: ScenarioSpace, uav: int) -> SlotCosts:
     """What a UAV takes of its battery, by its number in the fleet."""
     constants = constants_of(space)[0]
     slots = fleet.type_of(space.fleet, uav).slots_per_cell
     columns, rows = space.size
     hovering = constants["slot_costs"].reshape(-1, ACTIONS)[slots - 1, HOVERING]
-    return Costs(move_costs(constants, slots, (rows, columns)), int(hovering))
+    return SlotCosts(move_costs(constants, slots, (rows, columns)), int(hovering))
 
 
-def battery_of_trips(space: ScenarioSpace, costs: Costs) -> np.ndarray:
+def battery_of_trips(space: ScenarioSpace, costs: SlotCosts) -> np.ndarray:
     """(H, W) the battery [% / 1000] to a cell, for a slot there, and to a zone.
 
     It is infinite where no trip leads, and in zones, where a UAV that hovers is on the ground.
@@ -178,7 +178,7 @@ def _battery_of_guard(space: ScenarioSpace, uav: int) -> int:
     return int(margin(mission, u) + waiting_slot(mission))
 
 
-def _cells_along_a_line(costs: Costs, battery: int) -> int:
+def _cells_along_a_line(costs: SlotCosts, battery: int) -> int:
     """The cells along a line for which a battery lasts there and back, with a slot there."""
     north, east, south, west = (int(move.max()) for move in costs.moves)
     most_expensive = max(north + south, east + west)

@@ -23,14 +23,14 @@ from dess.physics import streams
 from dess.physics.section import Integer, Number, Section, for_sections
 
 # The highest rate or factor, the last slot and the largest number of a schedule.
-MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
+MOST_RATE, LAST, MOST_ROWS = 100, 1_000_000, 10_000
 MOST_AMOUNT = 10**9  # initial data of a node
 
 # The largest number of messages of a node and slot that are drawn. Of more of them, the deviation
 # is below 15 % of the mean, and a node has exactly its rate.
 MOST_MESSAGES = 50
 
-Rate = Annotated[Number, Field(ge=0, le=MOST)]
+Rate = Annotated[Number, Field(ge=0, le=MOST_RATE)]
 Amount = Annotated[Number, Field(ge=0, le=MOST_AMOUNT)]
 Time = Annotated[Number, Field(ge=0, le=LAST)]
 

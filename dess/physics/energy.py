@@ -23,7 +23,7 @@ from dess.physics import streams
 from dess.physics.section import Integer, Number, Section, for_sections
 
 PERCENT = 1000  # the thousandths of one percent
-MOST = 11 * PERCENT  # the largest cost of a slot in ``Consumption``
+MOST_COST = 11 * PERCENT  # the largest cost of a slot in ``Consumption``
 MOST_WIND = 10  # the largest surcharge of a move in the mean wind [%]
 SPEEDS = 8  # the most slots that a UAV takes for a cell (``dess.physics.fleet``)
 ACTIONS = 5  # north, east, south, west and hovering

@@ -7,11 +7,9 @@ import numpy as np
 
 from dess.base.errors import InputError, listed, shown
 from dess.physics.age import MOST_AGES
-from dess.physics.arrivals import MOST as MOST_RATE
-from dess.physics.arrivals import MOST_AMOUNT, MOST_MESSAGES
+from dess.physics.arrivals import MOST_AMOUNT, MOST_MESSAGES, MOST_RATE
 from dess.physics.chart import FAR, MOST_CHARTED, NO_FLY, Cell, parking_of, spread, zones_of
-from dess.physics.energy import MOST as MOST_COST
-from dess.physics.energy import PERCENT
+from dess.physics.energy import MOST_COST, PERCENT
 from dess.physics.failures import MOST_PADS
 from dess.physics.fleet import IN_UNITS, move_phases, places_per_slot, slowest
 from dess.scenario.data_sheet import DataSheet

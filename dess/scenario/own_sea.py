@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from dess.base.errors import InputError, validated
-from dess.physics.arrivals import MOST, MOST_AMOUNT
+from dess.physics.arrivals import MOST_AMOUNT, MOST_RATE
 from dess.physics.chart import Cell, Rectangle
 from dess.physics.section import Integer, Number, Strict
 from dess.scenario.no_fly import NoFlyFile, no_fly_in, polygons_hold, zones_in
@@ -181,7 +181,9 @@ class OwnSea(NamedTuple):
             has_rates = bool(arrivals.rates)
             has_data = bool(arrivals.initial)
             return [
-                Amounts("arrivals.rates", *rates, "", (0, MOST), "arrival_rate", rate, has_rates),
+                Amounts(
+                    "arrivals.rates", *rates, "", (0, MOST_RATE), "arrival_rate", rate, has_rates
+                ),
                 Amounts("arrivals.initial", *data, "", most, "initial_data", amount, has_data),
             ]
         kinds = []

@@ -32,8 +32,8 @@ log = logging.getLogger(__name__)
 
 AT_ONCE = 2
 STARTUP = 600  # for which a kernel is waited for on a busy machine [s]
-HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
-# The path of a socket may have 104 characters, of which those in ``HOME`` need some 30.
+_FOLDER = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
+# The path of a socket may have 104 characters, of which those in ``_FOLDER`` need some 30.
 LONGEST = 70
 PACKAGES = Path(dess.__file__).parents[1]  # the folder from which this package was imported
 # What a library writes to the streams of the process is no output of a cell.
@@ -56,7 +56,7 @@ def run_reports(reports: Sequence[Report], progress: Progress | None = None) -> 
         if progress:
             progress(sum(report.done for report in reports), total, report.name)
 
-    with temporary_folder(_parent_of_sockets(), HOME) as home:
+    with temporary_folder(_parent_of_sockets(), _FOLDER) as home:
         runs = [
             _Run(report, home, home / f"{number}.json") for number, report in enumerate(reports)
         ]

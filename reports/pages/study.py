@@ -97,7 +97,7 @@ def page_title(results: Results, varied: Iterable[str]) -> str:
         varied: The fields that have several values.
     """
     fields = [field_named(field).within for field in varied]
-    if isinstance(results.study.selection, Cheapest):
+    if results.study.is_search:
         question = "Which fleet is the cheapest on {}?"
     elif results.design == "saltelli":
         question = "Which parameters matter on {}?"
@@ -278,7 +278,7 @@ def shown_setting(results: Results, metric: str | None = None) -> tuple[str, int
         results: The study.
         metric: The metric that ranks the settings, if it is not that of the study.
     """
-    if isinstance(results.study.selection, Cheapest):
+    if results.study.is_search:
         search = search_of(results)
         if results.study.years and search.best.points:
             points = search.best.points
@@ -298,7 +298,7 @@ def draw_years(results: Results, metric: str | None = None) -> Iterator[Drawing]
         metric: As for ``shown_setting``.
     """
     yield draw_calendar(results, *shown_setting(results, metric))
-    if isinstance(results.study.selection, Cheapest) and around.is_known(results):
+    if results.study.is_search and around.is_known(results):
         yield around.draw_ages(results)
 
 
@@ -341,7 +341,7 @@ def find_shown_parts(results: Results, varied: Sequence[str]) -> dict[str, bool]
     if fields <= 1 and kind not in ("saltelli", "latin-hypercube"):
         kind = "grid"  # it varies one field at most
     is_ranked = kind != "saltelli"
-    is_search = isinstance(study.selection, Cheapest)
+    is_search = study.is_search
     has_missions = not study.years
     is_scan = kind == "grid" or (kind == "table" and fields <= 2)
     return {

@@ -108,7 +108,7 @@ def forget_plan(mission, plan):
 def waits_in_zone(mission, u):
     """Whether a UAV hovers in a zone with few pads, where it waits until it may ask for one.
 
-    It hardly ever moves on, so it keeps its cell, and keeps no teammate out of the cells beside it.
+    It rarely moves on, so only its own cell is closed to teammates, and no cell beside it.
     """
     if not u.active or u.zone < 0 or u.executed != HOVER or u.overruled or lands(mission):
         return False

@@ -168,7 +168,7 @@ def is_late(mission, uavs, i, chart, planned, home, kept, reach):
 
 @shared_kernel
 def battery_around(mission, uavs, i, chart, planned, x, y, home, reach):
-    """The battery that UAV ``i`` needs to its parking cell, as it is and not as it may be most.
+    """The battery that UAV ``i`` needs to its parking cell: the exact one, and not a bound.
 
     ``battery_home`` takes the detour of the shortest ways around closed cells, and the battery of
     the cheapest way, which may be another. By this, each cell of two may seem to be on the better

@@ -16,7 +16,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from dess.base.errors import InputError, shown
-from dess.physics.energy import MOST, PERCENT
+from dess.physics.energy import MOST_COST, PERCENT
 from dess.physics.fleet import UavType
 from dess.scenario.data_sheet.defaults import ASSUMED
 from dess.scenario.data_sheet.power import MOST_TIME, Units
@@ -117,9 +117,9 @@ class DataSheet(Types, Radio):
             following["max_slots"] = int(self.slots("horizon", 100_000) + 1e-9)
         self.check_speeds()
         following["consumption.slots"] = self.costs()
-        if max(following["consumption.slots"][0]) > MOST:
+        if max(following["consumption.slots"][0]) > MOST_COST:
             problem = f"a slot takes {max(following['consumption.slots'][0]) / PERCENT:.1f} %"
-            raise InputError("max_speed", problem, f"{MOST // PERCENT} % at most")
+            raise InputError("max_speed", problem, f"{MOST_COST // PERCENT} % at most")
         if self.mtbf:
             following["failures.uav_rate"] = 1 / self.slots("mtbf")
             following["failures.uav_repair"] = 0.0

@@ -69,7 +69,7 @@ def without_delimiter(text: str) -> tuple[str, str]:
 
 
 def number_of(text: str, place: str) -> float:
-    """A number, be it with a decimal comma.
+    """A number, with a decimal point or comma.
 
     Raises:
         InputError: If it is none; ``place`` says where it stands.

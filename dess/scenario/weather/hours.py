@@ -18,8 +18,7 @@ import numpy as np
 from dess.base.elementary import cos, exp_of_each, log10, sin
 from dess.base.errors import InputError, listed
 from dess.base.files.reading import version_of
-from dess.physics.energy import ACTIONS, PERCENT, SPEEDS
-from dess.physics.energy import MOST as MOST_COST
+from dess.physics.energy import ACTIONS, MOST_COST, PERCENT, SPEEDS
 from dess.scenario.fields import Fields
 from dess.scenario.projection import Projection
 from dess.scenario.quantities import measured
@@ -36,7 +35,7 @@ _WINDS = ("wind", "gust")  # columns whose limits do not count in still air
 _ROUNDING = 1e-9  # what rounding may add to the square of an airspeed, as a share
 
 
-class State(IntEnum):
+class HourState(IntEnum):
     """Why an hour is closed; ``LIMIT + i`` is limit i of the section, the first that it breaks."""
 
     OPEN = 0
@@ -66,7 +65,7 @@ class Hours:
 
     Attributes:
         first: The first hour [UTC], as ``datetime64[h]``.
-        state: (N,) int8 why an hour is closed (``State``); of several reasons the one that is
+        state: (N,) int8 why an hour is closed (``HourState``); of several reasons the one that is
             first there.
         costs: (N, SPEEDS, 5) int16 what a slot of the moves north, east, south and west and of
             hovering takes of the battery [% / 1000], by the slots that a UAV takes for a cell; 0
@@ -86,8 +85,8 @@ class Hours:
     @property
     def names(self) -> dict[int, str]:
         """What closes an hour in a word, by its state, such as limits.waves for a limit."""
-        of_limits = {State.LIMIT + n: f"limits.{name}" for n, name in enumerate(self.limits)}
-        states = (State.NIGHT, State.MISSING, State.WIND)
+        of_limits = {HourState.LIMIT + n: f"limits.{name}" for n, name in enumerate(self.limits)}
+        states = (HourState.NIGHT, HourState.MISSING, HourState.WIND)
         return {int(state): state.name.lower() for state in states} | of_limits
 
 
@@ -178,14 +177,14 @@ def _hours_of(flight: _Flight, version: tuple[int, int]) -> Hours:
         if weather.calm and known_name(limit.column) in _WINDS:
             continue
         beyond = values < limit.value if limit.is_least else values > limit.value
-        state[beyond] = State.LIMIT + number
+        state[beyond] = HourState.LIMIT + number
         is_missing |= np.isnan(values)
     wind = np.where(is_missing | weather.calm, 0.0, series.wind)
     wind = wind * wind_factor(flight.altitude, _height_of(weather))
-    state[~_can_fly(flight, wind, series.origin)] = State.WIND
-    state[is_missing] = State.MISSING
-    state[~_is_operating(flight, series, offset)] = State.NIGHT
-    is_open = state == State.OPEN
+    state[~_can_fly(flight, wind, series.origin)] = HourState.WIND
+    state[is_missing] = HourState.MISSING
+    state[~_is_operating(flight, series, offset)] = HourState.NIGHT
+    is_open = state == HourState.OPEN
     costs = np.zeros((len(state), SPEEDS, ACTIONS), np.int16)
     costs[is_open] = _costs_of(flight, wind[is_open], series.origin[is_open])
     first, state, costs = _with_edges(series, offset, state, costs)
@@ -256,7 +255,7 @@ def _with_edges(
         return begin, state, costs
     before = max(_count(begin - whole[0][1]), 0)
     after = max(_count(whole[-1][2] - end), 0)
-    state = np.pad(state, (before, after), constant_values=State.MISSING)
+    state = np.pad(state, (before, after), constant_values=HourState.MISSING)
     return begin - before * HOUR, state, np.pad(costs, ((before, after), (0, 0), (0, 0)))
 
 

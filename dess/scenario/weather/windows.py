@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.scenario.weather.hours import Hours, State, Year
+from dess.scenario.weather.hours import Hours, HourState, Year
 
 
 class Window(NamedTuple):
@@ -30,7 +30,7 @@ def windows_of(hours: Hours, year: Year, longest: int, slot: float) -> list[Wind
         longest: The longest window [h].
         slot: A mission slot [s]; shorter windows are closed.
     """
-    starts, ends = _runs(hours.state[year.first : year.first + year.hours] == State.OPEN)
+    starts, ends = _runs(hours.state[year.first : year.first + year.hours] == HourState.OPEN)
     return [
         Window(year.first + first, min(longest, end - first))
         for start, end in zip(starts.tolist(), ends.tolist(), strict=True)
@@ -41,16 +41,17 @@ def windows_of(hours: Hours, year: Year, longest: int, slot: float) -> list[Wind
 
 def longest_gap(hours: Hours, year: Year) -> int:
     """The longest run of closed hours of a year [h]."""
-    starts, ends = _runs(hours.state[year.first : year.first + year.hours] != State.OPEN)
+    starts, ends = _runs(hours.state[year.first : year.first + year.hours] != HourState.OPEN)
     return int((ends - starts).max(initial=0))
 
 
 def shares_of(hours: Hours, year: Year) -> dict[str, float]:
     """The share of a year's hours that is open, and that each reason closes, by its name."""
     counts = np.bincount(
-        hours.state[year.first : year.first + year.hours], minlength=State.LIMIT + len(hours.limits)
+        hours.state[year.first : year.first + year.hours],
+        minlength=HourState.LIMIT + len(hours.limits),
     )
-    names = {int(State.OPEN): "open"} | hours.names
+    names = {int(HourState.OPEN): "open"} | hours.names
     return {name: float(counts[state] / year.hours) for state, name in names.items()}
 
 

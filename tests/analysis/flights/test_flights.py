@@ -20,7 +20,7 @@ from dess.analysis.flights import flight_plan
 from dess.analysis.flights.fence import outline_pieces
 from dess.analysis.flights.flight_plan import TABLE, FlightPlan
 from dess.analysis.flights.places import ZonePlaces
-from dess.analysis.flights.route import Craft, Moment, Place
+from dess.analysis.flights.route import Craft, GeoPoint, Moment
 from dess.analysis.flights.separation import Separation, Track, closest_approach
 from dess.model.state import sample_scenario
 from dess.physics.chart import NO_FLY
@@ -283,7 +283,7 @@ def test_uavs_of_a_zone_have_places_of_their_own(tmp_path):
     table = plan.make_table()
     places = table[["lon", "lat"]].drop_duplicates().to_numpy()
     assert len(places) == 2
-    [one, other] = (Place(*place) for place in places)
+    [one, other] = (GeoPoint(*place) for place in places)
     assert one.distance_to(other) >= 10
     assert plan.summarise()["closest_approach_on_ground_m"] >= 10
     assert plan.summarise()["closest_approach_m"] >= 10
@@ -294,7 +294,7 @@ def test_uavs_of_a_zone_have_places_of_their_own(tmp_path):
 
 def test_a_plan_in_which_uavs_come_too_near_is_refused(tmp_path, monkeypatch):
     """Nobody waits until the way is free: one lands where the other one is."""
-    places = ZonePlaces((Place(-0.0031, 0.0036),), (Place(-0.0031, 0.0036),) * 2)
+    places = ZonePlaces((GeoPoint(-0.0031, 0.0036),), (GeoPoint(-0.0031, 0.0036),) * 2)
     monkeypatch.setattr(ZonePlaces, "lay_out", lambda *_: places)
     with pytest.raises(InputError) as refusal:
         plan_of(write_sea(tmp_path, TYPED), *TOGETHER, uavs=2, pads=1)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dess import simulate
-from dess.model.reach import Costs, battery_of_trips, reach_of_nodes
+from dess.model.reach import SlotCosts, battery_of_trips, reach_of_nodes
 from dess.scenario.scenario import ScenarioSpace
 from tests.drawn import Script
 
@@ -101,7 +101,7 @@ def test_each_direction_has_its_cost_and_coasts_are_flown_around():
     space = _space(nodes=[[1, 0]], no_fly=wall, zone=[0, 0, 1, 1])
     moves = np.empty((4, 4, 64))
     moves[:] = np.array([900, 2072, 1100, 500])[:, None, None]  # north, east, south, west
-    trips = battery_of_trips(space, Costs(moves, 1216))
+    trips = battery_of_trips(space, SlotCosts(moves, 1216))
     assert trips[0, 1] == 2072 + 1216 + 500
     assert trips[0, 3] == 3 * (2072 + 500) + 3 * (900 + 1100) * 2 + 1216
     assert trips[0, 2] == trips[0, 0] == math.inf, "land, and the zone, where a UAV would stand"

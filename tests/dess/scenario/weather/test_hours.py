@@ -13,7 +13,15 @@ from dess import InputError, load_scenario
 from dess.scenario.data_sheet import DataSheet
 from dess.scenario.rotary_wing import airspeed_along, airspeeds_of
 from dess.scenario.scenario import ScenarioSpace
-from dess.scenario.weather.hours import Hours, State, Year, hours_of, offset_of, wind_factor, years
+from dess.scenario.weather.hours import (
+    Hours,
+    HourState,
+    Year,
+    hours_of,
+    offset_of,
+    wind_factor,
+    years,
+)
 from dess.scenario.weather.series import Series
 from dess.scenario.weather.windows import Window, longest_gap, shares_of, windows_of
 
@@ -55,12 +63,12 @@ def test_an_hour_is_closed_by_the_first_reason(write):
     path = write([(5, 0, 1.0), (5, 0, 1.6), ("", 0, 1.0), (9, 0, 1.0), (9, 45, 1.6), (5, 0, "")])
     limits = {"waves": "1.5 m", "wind": "4 m/s"}
     assert states(path) == [0, 0, 2, 3, 0, 0]
-    open_, missing, wind, waves = State.OPEN, State.MISSING, State.WIND, State.LIMIT
+    open_, missing, wind, waves = HourState.OPEN, HourState.MISSING, HourState.WIND, HourState.LIMIT
     assert states(path, limits={"waves": "1.5 m"}) == [open_, waves, missing, wind, waves, missing]
     assert states(path, limits=limits) == [waves + 1, waves, missing, wind, waves, missing]
     assert states(path, limits=limits, operating="03:00-05:00", longitude=0) == [
-        *[State.NIGHT] * 3,
-        *[wind, waves, State.NIGHT],
+        *[HourState.NIGHT] * 3,
+        *[wind, waves, HourState.NIGHT],
     ]
     hours = hours_of(space_of(path, limits=limits))
     assert hours.names == {1: "night", 2: "missing", 3: "wind", 4: "limits.waves", 5: "limits.wind"}
@@ -72,16 +80,16 @@ def test_in_still_air_known_hours_cost_and_close_as_without_wind(write):
     about: dict[str, Any] = {"limits": limits, "calm": True}
     hours = hours_of(space_of(write(rows), **about))
     state, costs = hours.state.tolist(), hours.costs
-    assert state == [State.OPEN, State.MISSING, State.LIMIT, State.OPEN]
+    assert state == [HourState.OPEN, HourState.MISSING, HourState.LIMIT, HourState.OPEN]
     still = hours_of(space_of(write([(0, *row[1:]) for row in rows]), limits=limits))
-    assert (costs[[0, 3]] == still.costs[3]).all() and still.state[3] == State.OPEN
+    assert (costs[[0, 3]] == still.costs[3]).all() and still.state[3] == HourState.OPEN
 
 
 def test_a_limit_may_be_the_least_value(write):
     path = write([(5, 0, 1.0), (5, 0, 2.0), (5, 0, 3.0)])
-    assert states(path, limits={"waves": "> 2 m"}) == [State.LIMIT, 0, 0]
-    assert states(path, limits={"waves": "<= 2 m"}) == [0, 0, State.LIMIT]
-    assert states(path, limits={"swh": "200 cm"}) == [0, 0, State.LIMIT]
+    assert states(path, limits={"waves": "> 2 m"}) == [HourState.LIMIT, 0, 0]
+    assert states(path, limits={"waves": "<= 2 m"}) == [0, 0, HourState.LIMIT]
+    assert states(path, limits={"swh": "200 cm"}) == [0, 0, HourState.LIMIT]
     with pytest.raises(InputError, match="weather.csv: has no gust, of the limits; allowed: wind"):
         states(path, limits={"gust": "9 m/s"})
 
@@ -99,7 +107,7 @@ def test_a_limit_may_be_the_least_value(write):
 def test_operating_hours_are_of_local_solar_time(write, operating, longitude, expected):
     path = write([(5, 0, 1.0)] * 24)
     found = states(path, operating=operating, longitude=longitude)
-    assert [hour for hour in range(24) if found[hour] == State.OPEN] == sorted(expected)
+    assert [hour for hour in range(24) if found[hour] == HourState.OPEN] == sorted(expected)
 
 
 def test_daylight_is_that_of_the_sea_and_of_the_longitude_of_the_series(write):
@@ -111,7 +119,7 @@ def test_daylight_is_that_of_the_sea_and_of_the_longitude_of_the_series(write):
             if longitude:
                 about["longitude"] = longitude
             hours = hours_of(load_scenario("jade-bight", weather=about))
-            is_open = np.flatnonzero(hours.state == State.OPEN)
+            is_open = np.flatnonzero(hours.state == HourState.OPEN)
             assert abs(len(is_open) - light) < 1
             assert is_open.mean() + 0.5 == pytest.approx(11.7, abs=0.7)  # the noon of the sun
 
@@ -134,10 +142,10 @@ def test_costs_are_those_of_a_sheet_with_this_wind(tmp_path_factory, winds, crui
         strongest = DataSheet.model_validate(SHEET | {"cruise": cruise}).strongest_wind(origin)
         if wind <= strongest:
             expected = np.array(DataSheet.model_validate(sheet).costs())
-            assert state == State.OPEN
+            assert state == HourState.OPEN
             assert costs[:3].tolist() == expected[:3].tolist() and not costs[3:].any()
         elif wind > strongest + 0.011:
-            assert state == State.WIND and not costs.any()
+            assert state == HourState.WIND and not costs.any()
 
 
 def test_airspeeds_of_many_winds_are_those_of_each():
@@ -184,7 +192,7 @@ def test_years_are_whole_but_for_a_day_at_the_edges(write):
     east = hours_of(space_of(path, longitude=150.0))  # local midnight is 10 h before that of UTC
     assert years(east) == [Year(2020, 0, 366 * 24)]
     assert east.first == np.datetime64("2019-12-31T14")
-    assert east.state[:11].tolist() == [State.MISSING] * 10 + [State.OPEN]
+    assert east.state[:11].tolist() == [HourState.MISSING] * 10 + [HourState.OPEN]
     assert not east.costs[:10].any() and east.costs[10, 0].all()
 
 
@@ -200,7 +208,7 @@ def test_local_time_is_that_of_the_longitude_in_whole_hours():
 
 
 def hours_with(is_open: Any) -> Hours:
-    state = np.where(np.array(is_open, bool), State.OPEN, State.WIND).astype(np.int8)
+    state = np.where(np.array(is_open, bool), HourState.OPEN, HourState.WIND).astype(np.int8)
     nothing = np.empty(0)
     series = Series(np.datetime64("2020-01-01T00"), nothing, nothing, {}, "", 0, {})
     return Hours(series.first, state, np.zeros((len(state), 8, 5), np.int16), (), 0, series)
@@ -294,7 +302,7 @@ def test_slower_uavs_have_more_open_hours(era5, cruise, share):
     space = load_scenario("jade-bight", **{"weather.file": ERA5}, **sheet)
     hours = hours_of(space)
     begin = int((era5.first - hours.first) / np.timedelta64(1, "h"))
-    is_open = hours.state[begin : begin + len(era5.wind)] == State.OPEN
+    is_open = hours.state[begin : begin + len(era5.wind)] == HourState.OPEN
     assert is_open.mean() == pytest.approx(share, abs=5e-5)
     angle = np.radians(era5.origin)
     along = np.maximum(abs(np.sin(angle)), abs(np.cos(angle)))
@@ -310,6 +318,6 @@ def test_limits_and_years_of_the_shipped_series():
     whole = years(hours)
     assert [year.year for year in whole] == [*range(1990, 2021)]
     assert whole[0].first == 5 and whole[-1].first + whole[-1].hours == len(hours.state)
-    assert (hours.state[-5:] == State.MISSING).all()
+    assert (hours.state[-5:] == HourState.MISSING).all()
     shares = [shares_of(hours, year) for year in whole]
     assert all(math.isclose(sum(share.values()), 1) for share in shares)
