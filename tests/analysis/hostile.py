@@ -48,8 +48,8 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
         for parts in (source.manifest.parts_of_team(team), source.manifest.parts_of_check(team)):
             if parts:
                 _copy(source, store, parts, [cells[part.cell.point] for part in parts])
-    for cell, replication in source.logged:
-        log = source.load_log(cell, replication)
+    for cell, replication in source.contents.logged:
+        log = source.contents.load_log(cell, replication)
         assert log is not None
         columns = dict(zip(log.column_names, log.columns, strict=True))
         store.keep_log(manifest.cells[cell.team][cell.point], replication, columns)
@@ -92,7 +92,7 @@ def _copy(source: Store, store: Store, parts: list[CellPart], cells: Any) -> Non
         parts[0].cell.team,
         tuple(CellPart(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
     )
-    tables = zip(*source._tables_with("missions", parts), strict=True)
+    tables = zip(*source.contents.tables_with("missions", parts), strict=True)
     rows = [rows_of(parts, stack_tables(of_kind)) for of_kind in tables]
     keys = {part.cell.key: cell.key for part, cell in zip(parts, cells, strict=True)}
     columns = [{str(n): of[n].to_numpy() for n in of} for of in rows]

@@ -71,7 +71,7 @@ def test_what_is_kept_is_no_part_of_the_results(results):
     missions.keep_logs(results, [("greedy", 5)], print)
     again = load_results(results.store.folder).store
     assert (again.manifest.key, again.files) == before
-    assert not any(replication == 5 for _, replication in again.logged)
+    assert not any(replication == 5 for _, replication in again.contents.logged)
 
 
 def test_nothing_is_written_where_a_link_leads(results, tmp_path):
