@@ -21,7 +21,8 @@ from dess.analysis.stats.intervals import interval_of
 from dess.analysis.stats.weights import post_stratified
 from dess.base.files.reading import read_text
 from dess.base.files.writing import write_file
-from dess.policies.learner.config import MISSION_SEED, load_config, read_description
+from dess.policies.learner.config import MISSION_SEED, load_config
+from dess.policies.learner.description import read_description
 from dess.policies.learner.trained import read_weights
 from dess.policies.registry import CARD, load
 from dess.policies.shipped import HEURISTICS

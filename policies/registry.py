@@ -29,7 +29,8 @@ from dess.base.errors import InputError, listed, shown, unknown_name
 from dess.base.files.reading import Missing, paths_in, read_text
 from dess.base.python_file import PythonName
 from dess.model.view import View
-from dess.policies.learner.config import CHECKPOINT, CONFIG, field_ranges, read_description
+from dess.policies.learner.config import CHECKPOINT
+from dess.policies.learner.description import CONFIG, field_ranges, read_description
 from dess.policies.shipped import HEURISTICS, PLANNERS
 from dess.scenario.fields import SAMPLED
 from dess.scenario.scenario import ScenarioSpace, load_scenario, scenario_names

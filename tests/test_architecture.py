@@ -43,7 +43,8 @@ ROOMS = {
         *("shipped", "network", "integers", "dense", "quantization"),
         *("adapter", "choices", "flight"),
         *("heuristics", "planner"),
-        *("learner.config", "learner.policy", "learner.arrays", "learner.trained"),
+        *("learner.config", "learner.description", "learner.policy"),
+        *("learner.arrays", "learner.trained"),
         "learner.network",
         *("learner.calibration", "learner.training"),
         *("learner.dqn", "learner.ppo", "learner.checkpoint", "learner.session", "learner"),
@@ -69,7 +70,7 @@ ROOMS = {
         *("answers.settings", "answers.fleet", "answers", "paper", "ask"),
     ),
     "reports": (
-        *("pages", "player", "crate"),
+        *("pages", "player", "animation", "crate"),
         *("interrupts", "cli"),
     ),
 }

@@ -41,7 +41,7 @@ ALLOWED = {
     "dess.policies.learner.arrays": {"safe_open", "save_file"},
     "dess.policies.learner.session": {"SummaryWriter"},
     "dess.reports.cli.mission_files": {"savefig"},
-    "dess.reports.player": {"saving"},
+    "dess.reports.animation": {"saving"},
     # The null device in the place of a closed stream; the licence of the package.
     "dess.reports.cli.console": {"open"},
     "dess.reports.crate": {"read_text"},

@@ -15,14 +15,15 @@ from pydantic import BaseModel
 from dess import InputError
 from dess.analysis.answers.policies.decision_times import Times
 from dess.analysis.ask.limits import Limits
+from dess.analysis.results.evidence import Evidence
 from dess.analysis.results.manifest import Manifest
-from dess.analysis.results.resimulate import Evidence
 from dess.analysis.study.study import Study
 from dess.analysis.wasm.module import About
 from dess.base.files.documents import Document
 from dess.model.record import MISSION_RECORD
 from dess.policies.learner.checkpoint import Header
-from dess.policies.learner.config import Description, TrainingConfig, load_config
+from dess.policies.learner.config import TrainingConfig, load_config
+from dess.policies.learner.description import Description
 from dess.policies.registry import TRAINED
 from dess.reports.pages.page import Card, Learned
 from dess.reports.pages.panel import Panel

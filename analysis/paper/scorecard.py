@@ -22,7 +22,8 @@ from dess.analysis.stats.differences import difference_of_intervals
 from dess.analysis.stats.intervals import Interval
 from dess.analysis.stats.verdict import INCONCLUSIVE, position_of
 from dess.base.files.reading import parse_toml, read_text
-from dess.policies.learner.config import TrainingConfig, read_description
+from dess.policies.learner.config import TrainingConfig
+from dess.policies.learner.description import read_description
 from dess.policies.registry import TRAINED
 from dess.policies.shipped import NULLS
 

@@ -32,7 +32,8 @@ from dess.policies.learner.arrays import (
     to_bytes,
     write_arrays,
 )
-from dess.policies.learner.config import CHECKPOINT, Name, Number, TrainingConfig
+from dess.policies.learner.config import CHECKPOINT, Name, TrainingConfig
+from dess.policies.learner.description import Number
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import to_arrays, to_tensors
 from dess.policies.learner.ppo import ProximalTraining

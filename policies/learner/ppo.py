@@ -29,7 +29,8 @@ from dess.model.record import MISSION_RECORD
 from dess.model.state import HOVER
 from dess.physics.chart import spread
 from dess.policies.learner import training
-from dess.policies.learner.config import MISSION_SEED, TrainingConfig, field_ranges
+from dess.policies.learner.config import MISSION_SEED, TrainingConfig
+from dess.policies.learner.description import field_ranges
 from dess.policies.learner.network import SetNetwork
 from dess.scenario.scenario import ScenarioSpace
 

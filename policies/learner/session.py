@@ -31,7 +31,8 @@ from dess.model.record import MISSION_RECORD
 from dess.model.state import MISSION, UAV
 from dess.policies.learner.calibration import calibrate
 from dess.policies.learner.checkpoint import load_training, new_training, save_training
-from dess.policies.learner.config import CHECKPOINT, MODEL, TrainingConfig
+from dess.policies.learner.config import CHECKPOINT, TrainingConfig
+from dess.policies.learner.description import MODEL
 from dess.policies.learner.dqn import ReplayMemory
 from dess.policies.learner.network import count_units, make_network, to_arrays
 from dess.policies.learner.trained import (

@@ -1,8 +1,8 @@
 """A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
 
-``config.json`` describes the weights (``dess.policies.learner.config``) and has their checksum. A
-policy of vectors or of sets acts with ``integers.safetensors``, which was made of these weights
-(``dess.policies.learner.calibration``) and has a checksum of both.
+``config.json`` describes the weights (``dess.policies.learner.description``) and has their
+checksum. A policy of vectors or of sets acts with ``integers.safetensors``, which was made of these
+weights (``dess.policies.learner.calibration``) and has a checksum of both.
 """
 
 import copy
@@ -39,18 +39,20 @@ from dess.policies.learner.arrays import (
     require_weights,
 )
 from dess.policies.learner.config import (
+    TrainingConfig,
+    config_names,
+    learner_identifier,
+    resume_command,
+)
+from dess.policies.learner.description import (
     CONFIG,
     FORMAT,
     MODEL,
     Description,
     LayoutTable,
     Run,
-    TrainingConfig,
-    config_names,
     field_ranges,
-    learner_identifier,
     read_description,
-    resume_command,
 )
 from dess.policies.learner.policy import (
     DenseIntegerNetwork,

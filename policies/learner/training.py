@@ -20,7 +20,8 @@ from dess.envs.observations.states import CompactStates, compact_states
 from dess.envs.stepper import MissionStepper
 from dess.model.batch import simulate_batch
 from dess.policies.learner.arrays import require_weights
-from dess.policies.learner.config import Phase, TrainingConfig, field_ranges
+from dess.policies.learner.config import Phase, TrainingConfig
+from dess.policies.learner.description import field_ranges
 from dess.policies.learner.network import make_network, to_arrays, to_tensors
 from dess.policies.learner.policy import LearnedPolicy
 from dess.policies.learner.trained import expected_weights, make_observation, make_policy

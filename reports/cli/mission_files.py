@@ -88,7 +88,7 @@ def save_figure(figure: "Figure", path: Path, kind: str) -> None:
 
 
 def _write_animation(mission: SimulatedMission, path: Path, kind: str) -> None:
-    from dess.reports.player import write_animation
+    from dess.reports.animation import write_animation
 
     if kind == "html":
         _write_page(mission, path)
@@ -97,7 +97,7 @@ def _write_animation(mission: SimulatedMission, path: Path, kind: str) -> None:
 
 
 def _write_path(mission: SimulatedMission, path: Path, kind: str) -> None:
-    from dess.analysis.results.event_log import path_text
+    from dess.analysis.results.paths import path_text
     from dess.base.files.writing import fill
 
     altitudes = None
@@ -147,7 +147,7 @@ class Outputs:
         console.check_ending("--animation", self.animation, ANIMATIONS, "an animation")
         console.check_ending("--path", self.path, PATHS, "a path")
         if self.animation and self.animation.suffix.lower() == ".mp4":
-            from dess.reports.player import check_ffmpeg
+            from dess.reports.animation import check_ffmpeg
 
             check_ffmpeg()
         if self.fill_stdout and as_json:

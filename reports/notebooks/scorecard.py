@@ -30,7 +30,7 @@ from dess.analysis.figures.comparison import plot_claims
 from dess.analysis.paper import scorecard, values
 from dess.analysis.results.chunks import MANIFEST
 from dess.base.files.reading import paths_in
-from dess.policies.learner.config import read_description
+from dess.policies.learner.description import read_description
 from dess.reports.pages.markdown import write_markdown
 from dess.reports.pages.parts import lead_figure, make_answer
 from dess.reports.pages.provenance import provenance_table, weights_table

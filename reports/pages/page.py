@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dess import InputError
-from dess.analysis.results.resimulate import Evidence
+from dess.analysis.results.evidence import Evidence
 from dess.base.files.documents import Document
 from dess.base.files.reading import read_text
 

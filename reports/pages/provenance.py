@@ -8,7 +8,7 @@ import pandas as pd
 from IPython.display import HTML
 
 from dess.analysis.numbers import format_span
-from dess.analysis.results.resimulate import Evidence, learned_files
+from dess.analysis.results.evidence import Evidence, learned_files
 from dess.analysis.results.tables import Results
 from dess.analysis.study.files import budget_of
 from dess.reports.pages.page import STUDY, Learned, hidden_element

@@ -20,15 +20,9 @@ from dess.analysis.bound import upper_bound
 from dess.analysis.execution.effort import check_missions
 from dess.analysis.results import tables
 from dess.analysis.results.chunks import MANIFEST
+from dess.analysis.results.evidence import Evidence, SampleMission, draw_numbers, learned_files
 from dess.analysis.results.parquet import EVENTS
-from dess.analysis.results.resimulate import (
-    Evidence,
-    SampleMission,
-    difference_in_words,
-    draw_numbers,
-    learned_files,
-    record_of,
-)
+from dess.analysis.results.resimulate import difference_in_words, record_of
 from dess.analysis.results.store import Store
 from dess.analysis.results.tables import Results, results_of
 from dess.base.files.reading import paths_in

@@ -15,7 +15,7 @@ from dess import policies
 from dess.analysis.figures import style
 from dess.analysis.results.event_log import residual_data, uav_slots
 from dess.model.state import sample_scenario
-from dess.reports.player import GIF, LAST_SECONDS, MP4, SLOTS_PER_SECOND, Film, write_animation
+from dess.reports.animation import GIF, LAST_SECONDS, MP4, SLOTS_PER_SECOND, Film, write_animation
 
 
 def mission(**fields: Any) -> tuple[pd.DataFrame, dess.Scenario]:

@@ -19,7 +19,8 @@ from dess.analysis.answers.training.curves import (
 from dess.analysis.figures import Drawing
 from dess.base.commands import command_line
 from dess.base.files.reading import paths_in
-from dess.policies.learner.config import TrainingConfig, learner_identifier, read_description
+from dess.policies.learner.config import TrainingConfig, learner_identifier
+from dess.policies.learner.description import read_description
 
 
 class Trained(NamedTuple):

@@ -38,7 +38,7 @@ from dess.analysis.paper.scorecard import (
 )
 from dess.analysis.results.tables import Results
 from dess.analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from dess.policies.learner.config import read_description
+from dess.policies.learner.description import read_description
 from dess.policies.registry import TRAINED
 from tests.analysis.small import grid
 

@@ -16,7 +16,8 @@ from dess import InputError
 from dess.model.state import MISSION, PLAIN_SENSOR, UAV
 from dess.policies.learner.arrays import hash_arrays, to_bytes
 from dess.policies.learner.checkpoint import load_training, save_training
-from dess.policies.learner.config import CHECKPOINT, MODEL
+from dess.policies.learner.config import CHECKPOINT
+from dess.policies.learner.description import MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import load_policy, save_policy
 from tests.analysis.small import write_scenario

@@ -20,7 +20,8 @@ from dess.base.signals import ENDING
 from dess.policies.learner import session
 from dess.policies.learner.arrays import hash_arrays
 from dess.policies.learner.checkpoint import load_training
-from dess.policies.learner.config import CHECKPOINT, CONFIG, MODEL, load_config
+from dess.policies.learner.config import CHECKPOINT, load_config
+from dess.policies.learner.description import CONFIG, MODEL
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.network import make_network, to_arrays
 from dess.policies.learner.session import CURVE, LOCK, choose_device, train

@@ -14,7 +14,7 @@ from safetensors.torch import load_file, save_file
 
 from dess.model.batch import simulate_batch
 from dess.policies.learner import trained
-from dess.policies.learner.config import CONFIG, MODEL, read_description
+from dess.policies.learner.description import CONFIG, MODEL, read_description
 from dess.policies.learner.dqn import DQNTraining
 from dess.policies.learner.trained import INTEGERS, load_policy, load_teacher, save_policy
 from dess.policies.registry import TRAINED

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dess.analysis.answers.diff import at_hand
-from dess.analysis.results.resimulate import Evidence
+from dess.analysis.results.evidence import Evidence
 from dess.analysis.results.tables import load_results
 from dess.reports.cli import main
 from dess.reports.pages.page import Page

@@ -8,7 +8,7 @@ import pytest
 
 from dess import load_scenario, simulate
 from dess.analysis.metrics import format_length
-from dess.analysis.results.event_log import path_text
+from dess.analysis.results.paths import path_text
 from dess.model.state import sample_scenario
 from dess.reports.cli import main
 from dess.reports.player import Playback

@@ -14,7 +14,7 @@ from nbformat.v4 import new_output
 from dess import InputError
 from dess.analysis import load_study, run_study
 from dess.analysis.bound import Bound
-from dess.analysis.results.resimulate import Evidence, learned_files
+from dess.analysis.results.evidence import Evidence, learned_files
 from dess.analysis.results.tables import load_results
 from dess.policies import registry
 from dess.policies.registry import TRAINED
