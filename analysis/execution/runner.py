@@ -27,7 +27,7 @@ from dess.analysis.execution.jobs import (
     chunk_size,
 )
 from dess.analysis.execution.workers import Pool, pool_of
-from dess.analysis.results import chunks, tables
+from dess.analysis.results import chunks, commands
 from dess.analysis.results.manifest import CellPart, Manifest, Selected
 from dess.analysis.results.replications import Present, gaps_between
 from dess.analysis.results.shards import Shard
@@ -345,7 +345,7 @@ class _Run:
         command = self.study.command(self.store.folder)
         if (mission := problem.mission) and not isinstance(job, BoundsJob):
             which = mission.cell, mission.replications[0]
-            command = tables.of_folder(self.store.folder, self.store.manifest, *which)
+            command = commands.of_folder(self.store.folder, self.store.manifest, *which)
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 

@@ -14,8 +14,9 @@ from typing import NamedTuple, Self
 from dess import InputError
 from dess.analysis.results.chunks import BUSY, LOCK, SHARDS
 from dess.base.errors import shown
+from dess.base.files.locks import locked
 from dess.base.files.reading import paths_in, read_text
-from dess.base.files.writing import delete, locked, remove_if_empty, write_file
+from dess.base.files.writing import delete, remove_if_empty, write_file
 
 MOST_SHARDS = 9999
 # How long a shard waits while others begin in the same folder [s].

@@ -50,6 +50,7 @@ from dess.analysis.results.rows import tables_of, with_worst_nodes
 from dess.analysis.study.fields import CHECK
 from dess.analysis.study.prices import PURCHASE
 from dess.analysis.study.study import Study
+from dess.base.files.locks import locked
 from dess.base.files.reading import paths_in, read_bytes
 from dess.base.files.tables import LIMIT
 from dess.base.files.writing import (
@@ -57,7 +58,6 @@ from dess.base.files.writing import (
     check_place,
     delete,
     is_read_only,
-    locked,
     make_folder,
     write_file,
 )

@@ -20,10 +20,11 @@ import pyarrow as pa
 import torch
 
 from dess.base.errors import InputError, shown
+from dess.base.files.locks import locked
 from dess.base.files.memory import check_memory
 from dess.base.files.reading import paths_in
 from dess.base.files.tables import write_table
-from dess.base.files.writing import check_folder, locked, writable
+from dess.base.files.writing import check_folder, writable
 from dess.base.signals import ENDING, SOON, is_fragile, send_to_main_thread
 from dess.envs.observations.observer import encoder_of
 from dess.model.batch import BATCH_SIZE

@@ -6,7 +6,8 @@ Here are the names of the files in a folder of pages, and what is refused before
 import sys
 from pathlib import Path
 
-from dess.base.files.writing import check_lock, check_target
+from dess.base.files.locks import check_lock
+from dess.base.files.writing import check_target
 
 # nbformat imports jsonschema, which compiles grammars of web addresses if it finds rfc3987_syntax.
 # That takes a second, and no schema of a notebook has an address.

@@ -23,7 +23,7 @@ from nbformat.v4 import new_output
 
 import dess
 from dess import InputError
-from dess.base.files.writing import temporary_folder
+from dess.base.files.locks import temporary_folder
 from dess.reports.pages import ASKED
 from dess.reports.pages.missing import Progress
 from dess.reports.pages.notebook import Report

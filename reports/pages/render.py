@@ -12,8 +12,9 @@ from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.manifest import Manifest
 from dess.analysis.results.tables import Results
 from dess.base.commands import command_line
+from dess.base.files.locks import locked
 from dess.base.files.reading import Missing
-from dess.base.files.writing import delete, locked, write_files
+from dess.base.files.writing import delete, write_files
 from dess.reports.pages import INDEX, LOCK, check_pages, missing, notebook
 from dess.reports.pages.finished import find_finished_page
 from dess.reports.pages.index import add_bars, find_pages, make_index

@@ -18,7 +18,7 @@ import pyarrow as pa
 from dess import InputError, simulate
 from dess.analysis.bound import upper_bound
 from dess.analysis.execution.effort import check_missions
-from dess.analysis.results import tables
+from dess.analysis.results import commands
 from dess.analysis.results.chunks import MANIFEST
 from dess.analysis.results.evidence import Evidence, SampleMission, draw_numbers, learned_files
 from dess.analysis.results.parquet import EVENTS
@@ -199,7 +199,7 @@ def _compare_missions(evidence: Evidence, drawn: _Drawn, named: Collection[str] 
         record = record_of(space, team, evidence.seed, mission.replication, processes)
         if changed := difference_in_words(record, mission.record):
             coordinates = (mission.policy, mission.values, mission.replication)
-            command = tables.of_fields(evidence, *coordinates)
+            command = commands.of_fields(evidence, *coordinates)
             lines.append(f"{changed}; command: {command}")
     return Check(evidence.study.name, len(drawn), lines, evidence.changes_here(named))
 
@@ -223,7 +223,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         if not stored.to_pandas().equals(
             _match_stored_columns(pd.DataFrame(log.columns()), stored)
         ):
-            command = tables.of_folder(store.folder, manifest, cell, replication)
+            command = commands.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study.name}, event logs", len(logged), lines)
 

@@ -12,6 +12,7 @@ import pytest
 from filelock import FileLock
 
 from dess.base.errors import InputError
+from dess.base.files.locks import locked, temporary_folder
 from dess.base.files.reading import (
     Missing,
     checked,
@@ -27,10 +28,8 @@ from dess.base.files.writing import (
     check_new_folder,
     check_target,
     creating_folder,
-    locked,
     replacing,
     replacing_all,
-    temporary_folder,
     write_file,
     write_files,
 )
@@ -263,7 +262,7 @@ def test_an_interrupt_while_a_temporary_folder_is_removed_leaves_none(tmp_path, 
             raise interrupts.pop()
         remove(folder, **options)
 
-    monkeypatch.setattr("dess.base.files.writing.shutil.rmtree", interrupted)
+    monkeypatch.setattr("dess.base.files.locks.shutil.rmtree", interrupted)
     with pytest.raises(KeyboardInterrupt), temporary_folder(tmp_path, "t-") as folder:
         (folder / "file").write_text("half")
     assert not [*tmp_path.iterdir()]
