@@ -1,5 +1,6 @@
 """Questions asked in one line, ``analysis.sweep`` and ``analysis.what_if``, and their answers."""
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -491,7 +492,9 @@ def _progress_bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
     """A progress bar in missions, shown if they take a second; its total may grow by a rule."""
     from tqdm.auto import tqdm
 
-    with tqdm(unit="mission", delay=1) as bar:
+    # The bar of notebooks does not read this variable, with which pages are made.
+    is_disabled = os.environ.get("TQDM_DISABLE", "0") != "0"
+    with tqdm(unit="mission", delay=1, disable=is_disabled) as bar:
 
         def begin(started: Round) -> None:
             bar.total = started.missions

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import tqdm.notebook
 from matplotlib.figure import Figure
 from scipy import stats
 
@@ -14,6 +15,7 @@ from dess.analysis.answers import sides as paired
 from dess.analysis.answers.settings.points import varied_values
 from dess.analysis.answers.sides import BASELINE, VARIATION
 from dess.analysis.answers.variation import Variation, format_change
+from dess.analysis.ask.answer import _progress_bar
 from dess.analysis.metrics import PRODUCT, SUCCESS
 from dess.analysis.stats.corrections import adjust_p_values
 from dess.analysis.stats.differences import compare_pairs
@@ -360,3 +362,11 @@ def test_costs_are_compared_where_there_are_prices(tmp_path):
     assert "--price uav=500.0 --price charge=40.0" in answer.question.command
     with pytest.raises(InputError, match="^prices: 'uva' is unknown"):
         what_if({"uavs": 3}, prices={"uva": 1})
+
+
+def test_where_no_progress_bar_is_wanted_a_notebook_shows_none(monkeypatch):
+    """Pages are made in kernels of Jupyter with this variable of the environment."""
+    monkeypatch.setattr("tqdm.auto.tqdm", tqdm.notebook.tqdm)
+    monkeypatch.setenv("TQDM_DISABLE", "1")
+    with _progress_bar() as (advance, _):
+        assert advance.__self__.disable

@@ -124,7 +124,7 @@ class _FailsInOneThread:
     def act(self, view: View) -> np.ndarray:
         self.first = self.first or get_ident()
         if self.first != get_ident():
-            self.last_slot = int(view.constants["slot"].max())
+            self.last_slot = max(self.last_slot, int(view.constants["slot"].max()))
         elif self.last_slot:
             raise RuntimeError("failed")
         return np.full(len(view), HOVER)
