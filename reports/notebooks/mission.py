@@ -3,7 +3,6 @@
 #   dess:
 #     studies: [fig1, fig4]
 #     scripts: true
-#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

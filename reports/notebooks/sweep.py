@@ -2,7 +2,6 @@
 # jupyter:
 #   dess:
 #     studies: []
-#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

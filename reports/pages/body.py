@@ -102,7 +102,7 @@ def make_page(report: Report) -> Page:
     exporter.environment.globals |= {
         "report": report,
         "scripts": report.scripts,
-        "simulates": report.simulates,
+        "simulates": simulates(report.notebook.cells),
         "panel_hash": panel_hash,
         "script": PANEL_SCRIPT,
         "version": dess.__version__,
@@ -166,8 +166,18 @@ def section_anchor(heading: Markup) -> str:
 
 def has_panel(cells: Iterable[NotebookNode]) -> bool:
     """Whether a cell shows a panel, to which the page has a link."""
+    return _has_section(cells, "panel")
+
+
+def simulates(cells: Sequence[NotebookNode]) -> bool:
+    """Whether a cell shows what simulates missions, so that a browser has to run its script."""
+    return has_panel(cells) or _has_section(cells, "another")
+
+
+def _has_section(cells: Iterable[NotebookNode], name: str) -> bool:
+    """Whether a cell shows the section with a name."""
     outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
-    return any('<section id="panel"' in data.get("text/html", "") for data in outputs)
+    return any(f'<section id="{name}"' in data.get("text/html", "") for data in outputs)
 
 
 def term_anchor(term: str) -> str:

@@ -59,7 +59,6 @@ class Report:
         studies: Names of the results folders that it reads.
         optional: Patterns of the names of further ones, which it reads if they are there.
         scripts: Whether the page has scripts, such as those of sliders.
-        simulates: Whether it has a panel, which simulates missions; its script alone is run.
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
         results: The results folders that it reads, by the names that the page has for them; those
@@ -78,7 +77,6 @@ class Report:
     studies: list[str]
     optional: list[str]
     scripts: bool
-    simulates: bool
     original: NotebookNode
     notebook: NotebookNode
     results: dict[str, Path] = field(default_factory=dict)
@@ -239,9 +237,9 @@ def make_report(name: str, original: NotebookNode) -> Report:
     del notebook.cells[0]  # the header of the page shows them
     about = original.metadata["dess"]
     results = (about["studies"], about.get("optional", []))
-    scripts = (about.get("scripts", False), about.get("simulates", False))
+    scripts = about.get("scripts", False)
     description = " ".join(description.split())
-    return Report(name, title, description, *results, *scripts, original, notebook)
+    return Report(name, title, description, *results, scripts, original, notebook)
 
 
 def _check_notebook(name: str, notebook: NotebookNode) -> None:

@@ -2,7 +2,6 @@
 # jupyter:
 #   dess:
 #     studies: [age]
-#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

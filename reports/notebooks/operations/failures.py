@@ -2,7 +2,6 @@
 # jupyter:
 #   dess:
 #     studies: [failures]
-#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

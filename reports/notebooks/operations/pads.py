@@ -2,7 +2,6 @@
 # jupyter:
 #   dess:
 #     studies: [pads]
-#     simulates: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

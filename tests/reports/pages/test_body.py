@@ -1,18 +1,23 @@
 """The page of a notebook: sections, numbered figures, explained terms, the answer apart."""
 
 import re
+from html import unescape
 
 import nbformat
 import pandas as pd
+import pytest
 from IPython.display import HTML, DisplayObject
 from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from dess import load_scenario
 from dess.reports.pages.body import FOLDED, TERMS, make_page
 from dess.reports.pages.notebook import Report
 from dess.reports.pages.page import Page
+from dess.reports.pages.panel import make_another, make_panel
 from dess.reports.pages.parts import PART, Part, make_answer, make_figure, make_gallery
 from dess.reports.pages.tables import make_table
+from dess.reports.pages.templates import PANEL_SCRIPT, panel_hash
 
 
 def page(*cells: str | DisplayObject) -> Page:
@@ -26,9 +31,7 @@ def page(*cells: str | DisplayObject) -> Page:
         else:
             notebook.cells.append(new_markdown_cell(cell))
     nbformat.validate(notebook)
-    return make_page(
-        Report("test", "A title", "About it.", [], [], False, False, notebook, notebook)
-    )
+    return make_page(Report("test", "A title", "About it.", [], [], False, notebook, notebook))
 
 
 def main_of(*cells: str | DisplayObject) -> str:
@@ -121,3 +124,13 @@ def test_a_cell_of_sentences_has_a_wide_column_and_keeps_intervals_together():
     shown = make_table(pd.DataFrame(cells), wrap=True).data
     assert "<td>97.4\xa0% [96.5,\xa097.7]</td>" in shown
     assert shown.count('<td class="long">it is the best. it') == 1
+
+
+@pytest.mark.parametrize("make", [make_panel, make_another])
+def test_a_browser_runs_the_script_of_what_simulates_and_no_other(make):
+    """A page need not say that it has one, so no page can forget it."""
+    paper = load_scenario("paper")
+    spaces = (paper, paper) if make is make_panel else (paper,)
+    policy = unescape(page(make(*spaces, "paper", ["greedy"], 1)).text)
+    assert f"script-src 'sha256-{panel_hash(PANEL_SCRIPT)}' 'wasm-unsafe-eval'" in policy
+    assert "script-src" not in page("text").text
