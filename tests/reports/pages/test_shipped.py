@@ -141,6 +141,7 @@ def test_all_pages_are_the_same_bytes_elsewhere(pages, results, out, tmp_path, m
         assert (tmp_path / "new" / name).read_text("utf-8") == html
 
 
+@pytest.mark.brief
 @pytest.mark.parametrize("width", [1280, 390])
 def test_pages_fit_the_window_and_request_nothing(visit, pages, out, width):
     for name in pages:
