@@ -36,7 +36,8 @@ if TYPE_CHECKING:  # the tests import this module without MkDocs
     from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
-LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
+# The target of a link or a picture, in Markdown or as HTML.
+LINK = re.compile(r"(?:(?<=\]\()|(?<=<img src=\"))(?!https?:|#)([^)#\s\"]+)")
 PART = re.compile(r"^<!-- \[\[ (\w+)(?: ([\w -]+))? \]\] -->$", re.M)
 README = "README.md"
 REPORTS = ROOT / "build" / "reports"

@@ -119,9 +119,6 @@ make_gallery(
     ]
 )
 
-# %% [markdown]
-# ## Any other setting
-
 # %%
 space = fig5.scenario()
 make_panel(space, space, fig5.study.scenario, policies, fig5.store.manifest.seed)
