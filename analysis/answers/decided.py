@@ -10,6 +10,7 @@ from dess.analysis.answers.summary import means_of_points
 from dess.analysis.measured import ranking_column
 from dess.analysis.metrics import metric_of
 from dess.analysis.results.tables import Results
+from dess.analysis.study.cheapest import Cheapest
 from dess.analysis.tables import (
     INTERVALS,
     MOST_ROWS,
@@ -68,7 +69,7 @@ def selected_settings(results: Results) -> pd.DataFrame:
         setting, the rows of ``FleetSearch.selected_fleets``.
     """
     rule = results.study.selection
-    if results.study.is_search:
+    if isinstance(rule, Cheapest):
         return search_of(results).selected_fleets()
     words = points_in_words(results)
     rows = []
